@@ -1,0 +1,85 @@
+//! The one error type of the crate.
+
+use core::fmt;
+
+/// Why a builder refused its input, or a loader its bytes.
+///
+/// The kinds are private, so that new ones can be added; the message names the mesh, the element, the value
+/// and the limit that it broke.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Error(pub(crate) Kind);
+
+/// What went wrong, with everything that the message says.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Kind {
+    /// An image without texels, or with more than an index can hold.
+    ImageSize { what: &'static str, width: usize, height: usize, limit: usize },
+    /// The number of texels is not width times height.
+    TexelCount { what: &'static str, width: usize, height: usize, found: usize },
+    /// A texel that is NaN, infinite or, where that is an error, negative.
+    Texel { what: &'static str, x: usize, y: usize, value: f32 },
+    /// A scalar that is NaN, infinite or out of its range.
+    Scalar { what: &'static str, value: f32, expected: &'static str },
+    /// A rotation that is not orthonormal.
+    Rotation { determinant: f32 },
+    /// A vertex with a NaN or infinite coordinate, or one too large to square.
+    Position { mesh: usize, vertex: usize, value: [f32; 3], limit: f32 },
+    /// A texture coordinate that is NaN, infinite or too large.
+    TextureCoordinate { mesh: usize, vertex: usize, value: [f32; 2], limit: f32 },
+    /// A triangle that refers to a vertex that is not there.
+    Index { mesh: usize, triangle: usize, index: u32, vertices: usize },
+    /// A textured mesh without, or with too few, texture coordinates.
+    TextureCoordinateCount { mesh: usize, found: usize, vertices: usize },
+    /// A constant weight of a mesh that is NaN, infinite or negative.
+    Weight { mesh: usize, value: f32 },
+    /// A handle to a texture that this builder did not give out.
+    UnknownTexture { mesh: usize, texture: usize, textures: usize },
+    /// More of something than its index type can count.
+    TooMany { what: &'static str, count: usize, limit: usize },
+    /// Bytes that do not hold what they should.
+    Bytes { what: &'static str, at: usize, found: u64, expected: u64 },
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0 {
+            Kind::ImageSize { what, width, height, limit } => {
+                write!(f, "{what}: {width} x {height} texels, but each side must be from 1 to {limit}")
+            }
+            Kind::TexelCount { what, width, height, found } => {
+                write!(f, "{what}: {found} texels given for {width} x {height}")
+            }
+            Kind::Texel { what, x, y, value } => {
+                write!(f, "{what}: texel ({x}, {y}) is {value}, but must be finite and not negative")
+            }
+            Kind::Scalar { what, value, expected } => write!(f, "{what} is {value}, but must be {expected}"),
+            Kind::Rotation { determinant } => {
+                write!(f, "environment: the rotation is not orthonormal (determinant {determinant}, must be 1)")
+            }
+            Kind::Position { mesh, vertex, value: [x, y, z], limit } => {
+                write!(f, "mesh {mesh}: vertex {vertex} is at ({x}, {y}, {z}), but must be finite and within {limit:e}")
+            }
+            Kind::TextureCoordinate { mesh, vertex, value: [u, v], limit } => {
+                write!(f, "mesh {mesh}: vertex {vertex} has uv ({u}, {v}), but must be finite and within {limit:e}")
+            }
+            Kind::Index { mesh, triangle, index, vertices } => {
+                write!(f, "mesh {mesh}: triangle {triangle} uses vertex {index}, but there are {vertices}")
+            }
+            Kind::TextureCoordinateCount { mesh, found, vertices } => {
+                write!(f, "mesh {mesh}: its weight is a texture, but it has {found} uvs for {vertices} vertices")
+            }
+            Kind::Weight { mesh, value } => {
+                write!(f, "mesh {mesh}: the weight is {value}, but must be finite and not negative")
+            }
+            Kind::UnknownTexture { mesh, texture, textures } => {
+                write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")
+            }
+            Kind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
+            Kind::Bytes { what, at, found, expected } => {
+                write!(f, "bytes: {what} at offset {at} is {found:#x}, expected {expected:#x}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Error {}

@@ -1,0 +1,1 @@
+//! Plain geometry that knows nothing of light.

@@ -1,0 +1,15 @@
+//! Light sampling for renderers: textured mesh lights and light portals of any shape.
+
+#![no_std]
+
+extern crate alloc;
+#[cfg(feature = "std")]
+extern crate std;
+
+mod error;
+mod geometry;
+mod math;
+mod record;
+
+pub use error::Error;
+pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};

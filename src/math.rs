@@ -1,0 +1,78 @@
+//! Floating-point functions from `std` or from `libm`, chosen in this file alone.
+
+#[cfg(not(any(feature = "std", feature = "libm")))]
+compile_error!("fanlight needs the feature `std` or the feature `libm` for its floating-point functions");
+
+/// Square root of a non-negative number.
+#[inline(always)]
+pub(crate) fn sqrt(x: f32) -> f32 {
+    #[cfg(feature = "std")]
+    return x.sqrt();
+    #[cfg(not(feature = "std"))]
+    return libm::sqrtf(x);
+}
+
+/// Square root of a non-negative number, in double precision.
+#[inline(always)]
+pub(crate) fn sqrt64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.sqrt();
+    #[cfg(not(feature = "std"))]
+    return libm::sqrt(x);
+}
+
+/// Angle in `[0, π]` whose cosine is `x`, which is first clamped to `[-1, 1]`.
+#[inline]
+pub(crate) fn acos(x: f32) -> f32 {
+    let x = x.clamp(-1.0, 1.0);
+    #[cfg(feature = "std")]
+    return x.acos();
+    #[cfg(not(feature = "std"))]
+    return libm::acosf(x);
+}
+
+/// Angle in `[-π/2, π/2]` whose sine is `x`, which is first clamped to `[-1, 1]`.
+#[inline]
+pub(crate) fn asin(x: f32) -> f32 {
+    let x = x.clamp(-1.0, 1.0);
+    #[cfg(feature = "std")]
+    return x.asin();
+    #[cfg(not(feature = "std"))]
+    return libm::asinf(x);
+}
+
+/// Sine and cosine of an angle in radians.
+#[inline]
+pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
+    #[cfg(feature = "std")]
+    return x.sin_cos();
+    #[cfg(not(feature = "std"))]
+    return libm::sincosf(x);
+}
+
+/// Cosine of an angle in radians, in double precision.
+#[inline]
+pub(crate) fn cos64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.cos();
+    #[cfg(not(feature = "std"))]
+    return libm::cos(x);
+}
+
+/// Largest integer not above `x`.
+#[inline(always)]
+pub(crate) fn floor(x: f32) -> f32 {
+    #[cfg(feature = "std")]
+    return x.floor();
+    #[cfg(not(feature = "std"))]
+    return libm::floorf(x);
+}
+
+/// Largest integer not above `x`, in double precision.
+#[inline(always)]
+pub(crate) fn floor64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.floor();
+    #[cfg(not(feature = "std"))]
+    return libm::floor(x);
+}

@@ -1,0 +1,9 @@
+//! The plain records that a host hands in and gets back.
+
+mod image;
+mod sample;
+mod shading;
+
+pub use image::{Filter, Wrap};
+pub use sample::{Hit, LightSample, TriangleId};
+pub use shading::{Receiver, ShadingPoint};

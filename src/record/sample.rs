@@ -1,0 +1,45 @@
+//! What sampling returns and what a density is asked for.
+
+use glam::Vec3;
+
+/// One triangle of one mesh that was handed to the builder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TriangleId {
+    /// Number of the mesh, in the order in which meshes were added.
+    pub mesh: u32,
+    /// Number of the triangle in its mesh.
+    pub triangle: u32,
+}
+
+/// A point on a light triangle, as a host's own intersector reports it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// The triangle that was hit.
+    pub triangle: TriangleId,
+    /// Weights `b1`, `b2` of the second and third vertex; `b0 = 1 - b1 - b2` is the first one's.
+    pub barycentrics: [f32; 2],
+}
+
+/// A point on a light, drawn for a shading point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    /// Where on the lights the point lies.
+    pub hit: Hit,
+    /// World position of the point.
+    pub position: Vec3,
+    /// Unit normal of the triangle's front side (its vertices run counter-clockwise around it).
+    pub normal: Vec3,
+    /// Unit direction from the shading point to the point.
+    pub direction: Vec3,
+    /// Distance from the shading point to the point.
+    pub distance: f32,
+    /// Density of the point per solid angle at the shading point. Finite and above zero.
+    ///
+    /// It counts this triangle alone. Where a ray can cross several portals, a host that evaluates all that
+    /// arrives along the direction divides by the density of the *direction* instead.
+    pub pdf: f32,
+    /// Density of the same point per area of the light. Finite and above zero.
+    pub pdf_area: f32,
+    /// Probability (`pmf`) of having chosen the triangle. In `(0, 1]`.
+    pub pmf: f32,
+}
