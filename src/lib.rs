@@ -10,6 +10,9 @@ mod error;
 mod geometry;
 mod math;
 mod record;
+#[cfg(test)]
+mod testing;
+mod warp;
 
 pub use error::Error;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};

@@ -1,0 +1,7 @@
+//! Maps between uniform numbers and what is drawn with them.
+
+pub(crate) mod discrete;
+pub(crate) mod variate;
+
+pub(crate) use discrete::pick;
+pub(crate) use variate::{Variate, seed};

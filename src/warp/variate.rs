@@ -1,0 +1,212 @@
+//! Uniform variates that survive any number of discrete choices.
+
+/// Below this share of the unit interval, a [`Variate`] gets fresh low bits.
+///
+/// 2^-20 leaves 2^32 of the 2^52 steps of a double at the time of the refill: choices between two refills see
+/// a resolution of at least 2^-32, far below what any weight ratio of a tree needs.
+const REFILL_BELOW: f64 = 1.0 / (1u64 << 20) as f64;
+
+/// Largest `f64` below one.
+const ALMOST_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
+
+/// Largest `f32` below one.
+const ALMOST_ONE_F32: f32 = 1.0 - f32::EPSILON / 2.0;
+
+/// 2^-53, the spacing of the doubles just below one.
+const STEP: f64 = f64::EPSILON / 2.0;
+
+/// A uniform variate in `[0, 1)` that never runs out of bits.
+///
+/// Every discrete choice spends bits: the part of the unit interval that was chosen is stretched to all of it.
+/// An `f32` is empty after some 24 binary choices. This holds a double, whose low bits are a hash from the
+/// start; when choices have used up its leading bits, those steps that still tell inputs apart are kept and
+/// everything below them is hashed anew. So the leading structure of a stratified input is never disturbed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Variate {
+    /// In `[0, 1)`.
+    value: f64,
+    /// Share of the unit interval that `value` was stretched from since its low bits were last filled, in `(0, 1]`.
+    spent: f64,
+    /// State of the SplitMix64 generator of low bits.
+    state: u64,
+}
+
+impl Variate {
+    /// A variate from a number in `[0, 1)`, with the bits below 2^-24 taken from a hash of `salt`.
+    ///
+    /// A `u` out of the range is clamped to it, NaN counts as zero. Variates of one sample need different salts,
+    /// for example the [`seed`] of all its numbers plus a count.
+    #[inline]
+    pub(crate) fn new(u: f32, salt: u64) -> Self {
+        // `max` first: it turns NaN into 0.
+        let u = u.max(0.0).min(ALMOST_ONE_F32);
+        let mut variate = Self { value: 0.0, spent: 1.0, state: salt };
+        let low = variate.fresh() * (1.0 / 16_777_216.0);
+        variate.value = (f64::from(u) + low).min(ALMOST_ONE);
+        variate
+    }
+
+    /// The variate as a double in `[0, 1)`.
+    #[inline]
+    pub(crate) fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// The variate as a float in `[0, 1)`.
+    #[inline]
+    pub(crate) fn value_f32(&self) -> f32 {
+        (self.value as f32).min(ALMOST_ONE_F32)
+    }
+
+    /// Stretches `[low, low + width)`, the interval that was chosen because the value lies in it, to `[0, 1)`.
+    ///
+    /// A value outside of it through rounding is clamped. `width` must be above zero.
+    #[inline]
+    pub(crate) fn rescale(&mut self, low: f64, width: f64) {
+        // `max` first: it also swallows the NaN of 0 / 0.
+        self.value = ((self.value - low) / width).max(0.0).min(ALMOST_ONE);
+        self.spent *= width;
+        // Negated, so that a NaN `spent` is mended too.
+        if !(self.spent >= REFILL_BELOW) {
+            self.refill();
+        }
+    }
+
+    /// Keeps the leading steps that the value still resolves, and replaces all below by fresh bits.
+    #[cold]
+    fn refill(&mut self) {
+        // The cast truncates, saturates, and maps NaN to zero: no `floor` needed.
+        let steps = ((self.spent * (1u64 << 52) as f64) as u64).clamp(1, 1 << 52) as f64;
+        let kept = (self.value * steps) as u64 as f64;
+        self.value = ((kept + self.fresh()) / steps).min(ALMOST_ONE);
+        self.spent = 1.0;
+    }
+
+    /// Uniform in `[0, 1)`, a multiple of 2^-53 (SplitMix64, Steele et al. 2014).
+    #[inline]
+    fn fresh(&mut self) -> f64 {
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        (mix(self.state) >> 11) as f64 * STEP
+    }
+}
+
+/// Finaliser of SplitMix64: every input bit changes every output bit with probability one half.
+#[inline]
+const fn mix(mut x: u64) -> u64 {
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+/// A hash of all bits of the numbers that one sample is drawn with, the salt of its [`Variate`]s.
+#[inline]
+pub(crate) fn seed(u: &[f32]) -> u64 {
+    u.iter().fold(0x243f_6a88_85a3_08d3, |hash, x| {
+        mix(hash.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(u64::from(x.to_bits())))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Pcg32, chi_square_limit};
+
+    /// Sum over 60 levels of the chi-square of a choice between two halves.
+    fn chi_square_of_depth_60(mut choose: impl FnMut(f32, &mut [u32; 60])) -> f64 {
+        let count = 100_000;
+        let mut pcg = Pcg32::new(1, 1);
+        let mut taken = [0; 60];
+        for _ in 0..count {
+            choose(pcg.next_f32(), &mut taken);
+        }
+        let n = f64::from(count);
+        taken.iter().map(|&t| (f64::from(t) - 0.5 * n).powi(2) / (n * 0.25)).sum()
+    }
+
+    #[test]
+    fn sixty_choices_are_unbiased() {
+        let variate = chi_square_of_depth_60(|u, taken| {
+            let mut v = Variate::new(u, seed(&[u]));
+            for t in taken {
+                if v.value() < 0.5 {
+                    v.rescale(0.0, 0.5);
+                } else {
+                    *t += 1;
+                    v.rescale(0.5, 0.5);
+                }
+            }
+        });
+        assert!(variate < chi_square_limit(60), "{variate}");
+    }
+
+    #[test]
+    fn the_same_test_rejects_a_rescaled_float() {
+        let naive = chi_square_of_depth_60(|mut v, taken| {
+            for t in taken {
+                if v < 0.5 {
+                    v *= 2.0;
+                } else {
+                    *t += 1;
+                    v = (v - 0.5) * 2.0;
+                }
+            }
+        });
+        assert!(naive > 10.0 * chi_square_limit(60), "{naive}");
+    }
+
+    #[test]
+    fn the_rest_is_uniform_after_an_unlikely_choice() {
+        // Of 2^24 inputs only those in [0.3, 0.3 + 2^-12) get through, 4096 of them, over and over.
+        let (low, width) = (f64::from(0.3_f32), 1.0 / 4096.0);
+        let mut counts = [0_u32; 64];
+        let mut total = 0;
+        for i in 0..1_u32 << 24 {
+            let u = i as f32 / 16_777_216.0;
+            if !(0.3..0.301).contains(&u) {
+                continue;
+            }
+            for salt in 0..16 {
+                let mut v = Variate::new(u, seed(&[u]).wrapping_add(salt));
+                if v.value() >= low && v.value() < low + width {
+                    v.rescale(low, width);
+                    // A second unlikely choice would leave nothing of the input; what counts is that it refills.
+                    v.rescale(0.0, 1.0);
+                    counts[(v.value() * 64.0) as usize] += 1;
+                    total += 1;
+                }
+            }
+        }
+        let expected = f64::from(total) / 64.0;
+        let statistic: f64 = counts.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
+        assert!(total > 60_000 && statistic < chi_square_limit(63), "{statistic} of {total}");
+    }
+
+    #[test]
+    fn leading_bits_are_the_input_s() {
+        for u in [0.0, 0.25, 0.999_999_9, ALMOST_ONE_F32] {
+            let mut v = Variate::new(u, 7);
+            assert!((v.value() - f64::from(u)).abs() < 1.0 / 16_777_216.0);
+            assert!(v.value_f32() < 1.0);
+            // Sixteen binary digits down, the input's digits are still the ones that decide.
+            let mut digits = 0.0;
+            for level in 1..=16 {
+                let bit = if v.value() < 0.5 { 0.0 } else { 0.5 };
+                v.rescale(bit, 0.5);
+                digits += bit * 2.0 / f64::from(1 << level);
+            }
+            assert!((digits - f64::from(u)).abs() < 1.0 / 65_535.0);
+        }
+    }
+
+    #[test]
+    fn any_input_stays_in_the_unit_interval() {
+        for u in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, -0.0, 1.0, 2.0, f32::MIN_POSITIVE] {
+            let mut v = Variate::new(u, 3);
+            for (low, width) in [(0.0, 1.0), (0.0, 0.0), (0.5, 1e-300), (0.9, 0.1), (f64::NAN, f64::NAN), (0.1, 0.7)] {
+                assert!((0.0..1.0).contains(&v.value()) && (0.0..1.0).contains(&v.value_f32()));
+                v.rescale(low, width);
+            }
+            assert!((0.0..1.0).contains(&v.value()));
+        }
+    }
+}
