@@ -6,10 +6,13 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+#[cfg_attr(not(test), expect(dead_code, reason = "the lights are to use it"))]
+mod blas;
 mod error;
 mod geometry;
 mod math;
 mod record;
+mod warp;
 
 pub use error::Error;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
