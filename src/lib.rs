@@ -6,6 +6,8 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+#[cfg_attr(not(test), expect(dead_code, reason = "the lights are to use it"))]
+mod blas;
 mod error;
 mod geometry;
 mod math;

@@ -1,6 +1,7 @@
-//! Maps between uniform numbers and what is drawn with them.
+//! Maps between the unit square, where random numbers live, and the domains that are sampled.
 
 pub(crate) mod discrete;
+pub(crate) mod triangle;
 pub(crate) mod variate;
 
 pub(crate) use discrete::pick;
