@@ -14,5 +14,6 @@ mod math;
 mod record;
 mod warp;
 
+pub use blas::Texture;
 pub use error::Error;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
