@@ -16,5 +16,6 @@ mod record;
 mod testing;
 mod warp;
 
+pub use blas::Texture;
 pub use error::Error;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};

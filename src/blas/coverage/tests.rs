@@ -1,0 +1,112 @@
+use alloc::vec::Vec;
+use glam::Vec2;
+
+use super::*;
+use crate::blas::barycentric::Cell;
+use crate::blas::footprint::Chart;
+use crate::blas::pcg::Pcg;
+use crate::blas::texture::Texture;
+use crate::blas::touched::range;
+use crate::record::Wrap;
+
+const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
+
+fn average_of(prepared: &Prepared<'_>, uv: [Vec2; 3]) -> (f64, Range) {
+    let footprint = Chart::new(prepared.texture(), uv).footprint(Cell::root());
+    let range = range(prepared, &footprint, true);
+    (f64::from(average(prepared, &footprint, range)), range)
+}
+
+/// Look-ups at the centres of `n²` cells: mean, least and greatest.
+fn brute_force(texture: &Texture<'_>, uv: [Vec2; 3], n: u32) -> (f64, f64, f64) {
+    let [w, h] = texture.size().map(f64::from);
+    let [a, b, c] = uv.map(|p| [f64::from(p.x) * w, f64::from(p.y) * h]);
+    let (mut sum, mut min, mut max) = (0.0, f64::INFINITY, 0.0f64);
+    for i in 0..n {
+        for j in 0..n - i {
+            for third in 1..=2 {
+                if third == 2 && i + j == n - 1 {
+                    continue;
+                }
+                let b1 = (f64::from(i) + f64::from(third) / 3.0) / f64::from(n);
+                let b2 = (f64::from(j) + f64::from(third) / 3.0) / f64::from(n);
+                let at = |k: usize| a[k] + b1 * (b[k] - a[k]) + b2 * (c[k] - a[k]);
+                let value = texture.value_at(at(0), at(1));
+                sum += value;
+                (min, max) = (min.min(value), max.max(value));
+            }
+        }
+    }
+    (sum / f64::from(n * n), min, max)
+}
+
+fn random_uv(rng: &mut Pcg, scale: f32) -> [Vec2; 3] {
+    core::array::from_fn(|_| Vec2::new(scale * (2.0 * rng.f32() - 1.0), scale * (2.0 * rng.f32() - 1.0)))
+}
+
+fn compare(texture: Texture<'_>, uv: [Vec2; 3], tolerance: f64) {
+    let prepared = Prepared::new(texture);
+    let (found, range) = average_of(&prepared, uv);
+    let (mean, min, max) = brute_force(&texture, uv, 160);
+    let spread = f64::from(range.max - range.min);
+    assert!((found - mean).abs() <= tolerance * spread + 1e-6 * mean, "{found} is not {mean}: {texture:?} {uv:?}");
+    assert!(
+        f64::from(range.min) <= min * (1.0 + 1e-9) && max <= f64::from(range.max) * (1.0 + 1e-9),
+        "{texture:?} {uv:?}"
+    );
+}
+
+#[test]
+fn averages_are_those_of_many_look_ups() {
+    let mut rng = Pcg::new(5, 5);
+    for round in 0..300 {
+        let (w, h) = (1 + rng.below(9) as usize, 1 + rng.below(9) as usize);
+        let texels: Vec<f32> = (0..w * h).map(|_| rng.f32() * rng.f32()).collect();
+        let (u, v) = (WRAPS[round % 3], WRAPS[round / 3 % 3]);
+        let scale = [0.3, 1.0, 1.7][round % 7 % 3];
+        let uv = random_uv(&mut rng, scale);
+        let texture = Texture::new(w, h, &texels).unwrap().wrap(u, v);
+        compare(texture, uv, 2e-3);
+        compare(texture.filter(Filter::Nearest), uv, 2e-2);
+        // A line and a point.
+        compare(texture, [uv[0], uv[1], uv[0].midpoint(uv[1])], 5e-2);
+        compare(texture, [uv[0]; 3], 1e-6);
+    }
+}
+
+#[test]
+fn a_small_cell_is_integrated_to_rounding() {
+    // Between the four texel centres the image is x + y, so that its mean over the lower half is 2/3.
+    let texels = [0.0, 1.0, 1.0, 2.0];
+    let prepared = Prepared::new(Texture::new(2, 2, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
+    let uv = [Vec2::new(0.25, 0.25), Vec2::new(0.75, 0.25), Vec2::new(0.25, 0.75)];
+    assert!((average_of(&prepared, uv).0 - 2.0 / 3.0).abs() < 1e-7);
+    // Nearest: a quarter of a texel holds 0, two eighths hold 1.
+    let prepared = Prepared::new(prepared.texture().filter(Filter::Nearest));
+    assert!((average_of(&prepared, uv).0 - 0.5).abs() < 1e-7);
+}
+
+/// Larger footprints go through the pyramid.
+#[test]
+fn large_footprints_are_close() {
+    let mut rng = Pcg::new(6, 5);
+    let (w, h) = (100, 70);
+    let texels: Vec<f32> = (0..w * h).map(|i| (i % w) as f32 * 0.01 + rng.f32()).collect();
+    for round in 0..60 {
+        let uv = random_uv(&mut rng, [1.0, 3.0, 40.0][round % 3]);
+        let texture = Texture::new(w, h, &texels).unwrap().wrap(WRAPS[round % 2], WRAPS[round / 2 % 2]);
+        compare(texture, uv, 6e-2);
+        compare(texture.filter(Filter::Nearest), uv, 6e-2);
+    }
+}
+
+#[test]
+fn a_bright_texel_far_away_costs_no_precision() {
+    let mut texels = [1e-3f32; 64 * 64];
+    texels[63] = f32::MAX;
+    for at in [16.0, 32.0] {
+        let prepared = Prepared::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
+        let uv = [Vec2::new(0.0, 0.9), Vec2::new(at / 64.0, 0.9), Vec2::new(0.0, 0.2)];
+        assert!((average_of(&prepared, uv).0 - 1e-3).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,122 @@
+//! Minimum, maximum and mean of an image over ever larger blocks.
+
+use alloc::vec::Vec;
+
+use crate::blas::texture::Texture;
+
+/// What is known of a block of texels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Block {
+    /// The darkest texel.
+    pub(crate) min: f32,
+    /// The brightest texel.
+    pub(crate) max: f32,
+    /// The mean of the texels that exist (blocks at the far edges may be cut off).
+    pub(crate) mean: f32,
+}
+
+/// One texture with its pyramid. Level `l` has blocks of `2^l` texels to a side; level 0 is the image itself.
+#[derive(Clone, Debug)]
+pub(crate) struct Prepared<'a> {
+    texture: Texture<'a>,
+    /// From level 1 up to the one that is a single block.
+    levels: Vec<Level>,
+}
+
+#[derive(Clone, Debug)]
+struct Level {
+    size: [u32; 2],
+    blocks: Vec<Block>,
+}
+
+impl<'a> Prepared<'a> {
+    /// Builds the pyramid: 12 bytes for every third texel, about.
+    pub(crate) fn new(texture: Texture<'a>) -> Self {
+        let mut prepared = Self { texture, levels: Vec::new() };
+        let mut size = texture.size();
+        while size != [1, 1] {
+            let below = prepared.levels.len() as u32;
+            let [w, h] = size.map(|n| n.div_ceil(2));
+            let mut blocks = Vec::with_capacity(w as usize * h as usize);
+            for y in 0..h {
+                for x in 0..w {
+                    blocks.push(prepared.merge(below, x, y, size));
+                }
+            }
+            size = [w, h];
+            prepared.levels.push(Level { size, blocks });
+        }
+        prepared
+    }
+
+    /// The block above up to four blocks of the level `below`, which has `size` blocks.
+    fn merge(&self, below: u32, x: u32, y: u32, size: [u32; 2]) -> Block {
+        let [w, h] = self.texture.size();
+        let texels_along = |i: u32, n: u32| f64::from((n - (i << below)).min(1 << below));
+        let (mut min, mut max) = (f32::INFINITY, 0.0f32);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for j in 2 * y..(2 * y + 2).min(size[1]) {
+            for i in 2 * x..(2 * x + 2).min(size[0]) {
+                let block = self.block(below, i, j);
+                min = min.min(block.min);
+                max = max.max(block.max);
+                let texels = texels_along(i, w) * texels_along(j, h);
+                sum += f64::from(block.mean) * texels;
+                count += texels;
+            }
+        }
+        Block { min, max, mean: (sum / count) as f32 }
+    }
+
+    /// The texture itself.
+    pub(crate) fn texture(&self) -> &Texture<'a> {
+        &self.texture
+    }
+
+    /// A block of a level from 0 to [`Self::top`].
+    pub(crate) fn block(&self, level: u32, x: u32, y: u32) -> Block {
+        if level == 0 {
+            let value = self.texture.texel(x, y);
+            Block { min: value, max: value, mean: value }
+        } else {
+            let level = &self.levels[level as usize - 1];
+            level.blocks[y as usize * level.size[0] as usize + x as usize]
+        }
+    }
+
+    /// The level that is a single block.
+    pub(crate) fn top(&self) -> u32 {
+        self.levels.len() as u32
+    }
+
+    /// The whole image.
+    pub(crate) fn whole(&self) -> Block {
+        self.block(self.top(), 0, 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blas::pcg::Pcg;
+
+    #[test]
+    fn whole_image_of_any_size() {
+        let mut rng = Pcg::new(1, 1);
+        for (w, h) in [(1, 1), (1, 37), (5, 3), (64, 64), (33, 7)] {
+            let texels: Vec<f32> = (0..w * h).map(|_| rng.f32()).collect();
+            let prepared = Prepared::new(Texture::new(w, h, &texels).unwrap());
+            let whole = prepared.whole();
+            let mean = texels.iter().map(|&t| f64::from(t)).sum::<f64>() / texels.len() as f64;
+            assert_eq!(whole.min, texels.iter().copied().fold(f32::INFINITY, f32::min));
+            assert_eq!(whole.max, texels.iter().copied().fold(0.0, f32::max));
+            assert!((f64::from(whole.mean) / mean - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_largest_values_do_not_overflow() {
+        let texels = [f32::MAX; 16];
+        assert_eq!(Prepared::new(Texture::new(4, 4, &texels).unwrap()).whole().mean, f32::MAX);
+    }
+}

@@ -1,0 +1,117 @@
+//! The darkest and the brightest texel that a look-up inside of a footprint can touch.
+
+use crate::blas::axis::{Stretch, stretches};
+use crate::blas::footprint::Footprint;
+use crate::blas::pyramid::Prepared;
+use crate::math::floor64;
+use crate::record::Filter;
+
+/// Minimum and maximum of the touched texels. Every look-up in the footprint lies between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Range {
+    /// The darkest.
+    pub(crate) min: f32,
+    /// The brightest.
+    pub(crate) max: f32,
+}
+
+impl Range {
+    /// Whether every look-up gives the same.
+    pub(crate) fn is_constant(self) -> bool {
+        self.min == self.max
+    }
+}
+
+/// How far a texel reaches beyond its own square: bilinear look-up weighs it by a tent two texels wide.
+fn support(filter: Filter) -> f64 {
+    match filter {
+        Filter::Nearest => 0.0,
+        Filter::Bilinear => 0.5,
+    }
+}
+
+/// The range over a footprint. The footprint is closed and, where a host's `f32` could round across its edge, a
+/// little larger. With `exact` false it is enough that a range which is not constant is found not to be.
+///
+/// Where a footprint spans many copies of the image along an axis, all of the image along that axis counts.
+pub(crate) fn range(prepared: &Prepared<'_>, footprint: &Footprint, exact: bool) -> Range {
+    let texture = prepared.texture();
+    let support = support(texture.filtering());
+    let reach = footprint.slack.map(|slack| slack + support);
+    let along = |k: usize| {
+        let from = footprint.origin[k] + floor64(footprint.lo[k] - reach[k]) as i64;
+        let to = footprint.origin[k] + floor64(footprint.hi[k] + reach[k]) as i64;
+        stretches(texture.wrapping()[k], texture.size()[k], from, to, footprint.origin[k])
+    };
+    let (columns, rows) = (along(0), along(1));
+    let mut search = Search { prepared, footprint, reach, exact, range: Range { min: f32::INFINITY, max: 0.0 } };
+    for row in &rows {
+        for column in &columns {
+            search.stretch(column, row);
+        }
+    }
+    if search.range.min <= search.range.max {
+        search.range
+    } else {
+        // A footprint always lies on the plane. If rounding lost it, all of the image may be under it.
+        let whole = prepared.whole();
+        Range { min: whole.min, max: whole.max }
+    }
+}
+
+struct Search<'a> {
+    prepared: &'a Prepared<'a>,
+    footprint: &'a Footprint,
+    reach: [f64; 2],
+    exact: bool,
+    range: Range,
+}
+
+impl Search<'_> {
+    /// Starts at the level where the stretch is two blocks wide at most.
+    fn stretch(&mut self, column: &Stretch, row: &Stretch) {
+        let mut level = 0;
+        while (column.last >> level) - (column.first >> level) > 1 || (row.last >> level) - (row.first >> level) > 1 {
+            level += 1;
+        }
+        for y in row.first >> level..=row.last >> level {
+            for x in column.first >> level..=column.last >> level {
+                self.visit(column, row, level, x, y);
+            }
+        }
+    }
+
+    fn visit(&mut self, column: &Stretch, row: &Stretch, level: u32, x: u32, y: u32) {
+        let block = self.prepared.block(level, x, y);
+        // Nothing new in there; this is what makes the search short.
+        if block.min >= self.range.min && block.max <= self.range.max {
+            return;
+        }
+        if !self.exact && self.range.min < self.range.max {
+            return;
+        }
+        let clip = |stretch: &Stretch, i: u32| {
+            (stretch.first.max(i << level), stretch.last.min((i << level) + ((1 << level) - 1)))
+        };
+        let ((x0, x1), (y0, y1)) = (clip(column, x), clip(row, y));
+        if x0 > x1 || y0 > y1 {
+            return;
+        }
+        let grow = |[lo, hi]: [f64; 2], k: usize| [lo - self.reach[k], hi + self.reach[k]];
+        if !self.footprint.meets(grow(column.interval(x0, x1), 0), grow(row.interval(y0, y1), 1)) {
+            return;
+        }
+        if level == 0 || block.min == block.max {
+            self.range.min = self.range.min.min(block.min);
+            self.range.max = self.range.max.max(block.max);
+            return;
+        }
+        for child in 0..4 {
+            let (cx, cy) = (2 * x + (child & 1), 2 * y + (child >> 1));
+            // The last block of an odd count stands alone; outside of the stretch there is nothing.
+            if cx <= column.last >> (level - 1) && cy <= row.last >> (level - 1) {
+                self.visit(column, row, level - 1, cx, cy);
+            }
+        }
+    }
+}
