@@ -18,11 +18,12 @@ pub(crate) const MAX_AVERAGE: f32 = 1e30;
 /// It stands in for what rounding, and the blocks of a large footprint, can miss.
 const FLOOR: f64 = 1e-6;
 
-/// Footprints in boxes of up to this many texels to a side are integrated exactly.
-const EXACT_SIDE: f64 = 32.0;
+/// Footprints in boxes of up to this many texels to a side are integrated exactly. Leaves are far smaller, unless a
+/// triangle ran out of its budget.
+const EXACT_SIDE: f64 = 8.0;
 
 /// Larger ones are integrated over a level of the pyramid that has up to this many blocks to a side.
-const BLOCKS: f64 = 16.0;
+const BLOCKS: f64 = 8.0;
 
 /// A triangle is taken for a line when its area is this share of its longest edge's square.
 const LINE: f64 = 1e-9;
@@ -31,7 +32,7 @@ const LINE: f64 = 1e-9;
 ///
 /// It is zero exactly where the whole touched range is black. Otherwise it is a normal number between the range's
 /// ends, and exact (up to rounding, and up to a floor of a millionth of the brightest texel) for footprints within
-/// 32 x 32 texels.
+/// 8 x 8 texels.
 pub(crate) fn average(prepared: &Prepared<'_>, footprint: &Footprint, range: Range) -> f32 {
     if range.is_constant() {
         return storable(f64::from(range.max));
@@ -137,6 +138,10 @@ fn looked_up(prepared: &Prepared<'_>, footprint: &Footprint) -> f64 {
 /// A block of the pyramid along one axis, and what it covers.
 struct Piece {
     block: u32,
+    /// Texels of the block that count.
+    texels: [u32; 2],
+    /// Set if a single texel holds for the whole piece.
+    held: Option<u32>,
     interval: [f64; 2],
 }
 
@@ -165,11 +170,27 @@ fn blocks(prepared: &Prepared<'_>, footprint: &Footprint, line: bool) -> f64 {
         for column in &columns {
             let [x0, x1] = column.interval;
             let area = if as_box { (x1 - x0) * (y1 - y0) } else { strip.clip(0, x0, x1).area() };
-            sum += area * f64::from(prepared.block(level, column.block, row.block).mean);
+            sum += area * mean(prepared, level, column, row);
             total += area;
         }
     }
     sum / total
+}
+
+/// The mean over a block. Beyond a clamped edge, that over up to eight texels of the edge.
+fn mean(prepared: &Prepared<'_>, level: u32, column: &Piece, row: &Piece) -> f64 {
+    let texel = |x: u32, y: u32| f64::from(prepared.texture().texel(x, y));
+    let along = |[first, last]: [u32; 2], at: &dyn Fn(u32) -> f64| {
+        let count = (last - first + 1).min(8);
+        let texel = |i: u32| first + (2 * i + 1) * (last - first + 1) / (2 * count);
+        (0..count).map(|i| at(texel(i))).sum::<f64>() / f64::from(count)
+    };
+    match (column.held, row.held) {
+        (None, None) => f64::from(prepared.block(level, column.block, row.block).mean),
+        (Some(x), None) => along(row.texels, &|y| texel(x, y)),
+        (None, Some(y)) => along(column.texels, &|x| texel(x, y)),
+        (Some(x), Some(y)) => texel(x, y),
+    }
 }
 
 fn pieces(stretches: &[Stretch], level: u32, span: [f64; 2]) -> SmallVec<[Piece; 24]> {
@@ -187,7 +208,7 @@ fn pieces(stretches: &[Stretch], level: u32, span: [f64; 2]) -> SmallVec<[Piece;
                 // A line along the other axis still has a width here.
                 [lo, hi.min(span[1]).max(lo + 1e-6)]
             };
-            out.push(Piece { block, interval });
+            out.push(Piece { block, texels: [first, last], held: stretch.held_texel(), interval });
         }
     }
     out
