@@ -54,6 +54,7 @@ fn check<const M: usize>(texture: Texture<'_>, uv: [Vec2; 3], points: u32) -> us
         assert_eq!(root.average, storable(pool[root.node as usize].mean()));
     }
     for node in &pool {
+        assert!(node.averages().iter().all(|&a| a == 0.0 || a.is_normal()));
         for cell in 0..M {
             let below = node.below(cell);
             if below != LEAF {

@@ -61,13 +61,13 @@ fn averages_are_those_of_many_look_ups() {
     let mut rng = Pcg::new(5, 5);
     for round in 0..300 {
         let (w, h) = (1 + rng.below(9) as usize, 1 + rng.below(9) as usize);
-        let texels: Vec<f32> = (0..w * h).map(|_| rng.f32() * rng.f32()).collect();
+        let image: Vec<f32> = (0..w * h).map(|_| rng.f32() * rng.f32()).collect();
         let (u, v) = (WRAPS[round % 3], WRAPS[round / 3 % 3]);
         let scale = [0.3, 0.6, 1.7][round % 7 % 3];
         let uv = random_uv(&mut rng, scale);
-        let texture = Texture::new(w, h, &texels).unwrap().wrap(u, v);
-        // Beyond 8 x 8 texels, blocks stand in for texels.
-        let exact = Chart::new(&texture, uv).box_size().iter().all(|&n| n <= EXACT_SIDE);
+        let texture = Texture::new(w, h, &image).unwrap().wrap(u, v);
+        // Beyond, blocks stand in for texels.
+        let exact = texels(&Chart::new(&texture, uv).footprint(Cell::root())) <= EXACT_TEXELS;
         compare(texture, uv, if exact { 2e-3 } else { 1e-1 });
         compare(texture.filter(Filter::Nearest), uv, if exact { 2e-2 } else { 1e-1 });
         // A line and a point.
