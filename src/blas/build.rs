@@ -9,8 +9,10 @@ use crate::blas::coverage::{average, storable};
 use crate::blas::footprint::{Chart, check_uv};
 use crate::blas::node::{LEAF, Node, Root};
 use crate::blas::pyramid::Prepared;
+use crate::blas::texture::Texture;
 use crate::blas::touched::{self, Range};
 use crate::error::{Error, Kind};
+use crate::record::Wrap;
 
 /// A cell with no more area than this, in texels, is not divided if it is short, too.
 const LEAF_AREA: f64 = 1.0;
@@ -21,8 +23,14 @@ const LEAF_LENGTH: f64 = 1.5;
 /// Leaves for each texel that a triangle can see, at most. Half a texel each is what a tree of arity 4 needs.
 const LEAVES_PER_TEXEL: f64 = 4.0;
 
+/// Copies of the same texels have leaves of their own up to here, 0.7 MB of nodes.
+const MAX_LEAVES_OF_COPIES: f64 = (1 << 16) as f64;
+
 /// Leaves for one triangle, at most: about 11 MB of nodes.
 const MAX_LEAVES: f64 = (1 << 20) as f64;
+
+/// With fewer leaves than this to a copy of the image, all averages would be much the same.
+const LEAVES_PER_COPY: f64 = 4.0;
 
 /// A cell that is still to be divided, and where its average and its node belong.
 struct Open {
@@ -36,8 +44,10 @@ struct Open {
 /// Adds the BLAS of a triangle with these texture coordinates to the pool.
 ///
 /// A cell is divided until look-ups in it are all the same, or until it has at most one texel's area and edges of at
-/// most 1.5 texels. A triangle that spans so much of the plane that its budget of leaves (four for each texel that it
-/// can see, 2^20 in all) runs out divides the cells with the largest contrast first; the others keep their average.
+/// most 1.5 texels. A triangle that spans so much of the plane that its budget of leaves runs out divides the cells
+/// with the largest contrast first; the others keep their average. The budget is four leaves for each texel that it
+/// can see, where copies of one texel count once beyond 2^16 leaves, and 2^20 in all. If that leaves fewer than four
+/// for each copy of the image, the triangle is not divided.
 ///
 /// # Errors
 ///
@@ -59,11 +69,15 @@ pub(crate) fn build<const M: usize>(
     let chart = Chart::new(prepared.texture(), uv);
     let range = touched::range(prepared, &chart.footprint(Cell::root()), false);
     let levels = levels::<M>(&chart);
-    if range.is_constant() || levels == 0 {
-        return Ok(Root::constant(leaf(prepared, &chart, Cell::root(), range)));
+    let leaves = max_leaves(&chart, prepared.texture());
+    if range.is_constant() || levels == 0 || leaves < M as f64 {
+        let footprint = chart.footprint(Cell::root());
+        let range = touched::range(prepared, &footprint, true);
+        return Ok(Root::constant(average(prepared, &footprint, range)));
     }
     let start = pool.len();
-    let max_nodes = max_nodes::<M>(&chart, prepared.texture().size());
+    // Dividing a leaf adds M - 1 leaves.
+    let max_nodes = (leaves / (M - 1) as f64) as usize;
     let mut open = alloc::vec![Open { cell: Cell::root(), range, node: LEAF, slot: 0 }];
     for level in 0..levels {
         let room = max_nodes - (pool.len() - start);
@@ -103,12 +117,15 @@ fn levels<const M: usize>(chart: &Chart) -> u32 {
     levels
 }
 
-/// The budget of nodes. Dividing a leaf adds `M - 1` leaves.
-fn max_nodes<const M: usize>(chart: &Chart, size: [u32; 2]) -> usize {
-    let [w, h] = chart.box_size();
-    let texels = (w + 2.0).min(f64::from(size[0])) * (h + 2.0).min(f64::from(size[1]));
-    let leaves = (LEAVES_PER_TEXEL * texels).min(MAX_LEAVES);
-    ((leaves / (M - 1) as f64) as usize).max(1)
+/// The budget of leaves, 0 if dividing would not help.
+fn max_leaves(chart: &Chart, texture: &Texture<'_>) -> f64 {
+    let [w, h] = chart.box_size().map(|n| n + 2.0);
+    let size = texture.size().map(f64::from);
+    let seen = w.min(size[0]) * h.min(size[1]);
+    let leaves = (LEAVES_PER_TEXEL * w * h).min(MAX_LEAVES_OF_COPIES.max(LEAVES_PER_TEXEL * seen)).min(MAX_LEAVES);
+    let copies = 0.5 * chart.extent().0 / (size[0] * size[1]);
+    let repeats = !texture.wrapping().contains(&Wrap::Clamp);
+    if repeats && leaves < LEAVES_PER_COPY * copies { 0.0 } else { leaves }
 }
 
 /// Adds a node for a cell. Its own cells are set, or put off to the next level.
@@ -127,22 +144,15 @@ fn divide<const M: usize>(
     let mut node = Node::black();
     for slot in 0..M {
         let cell = parent.cell.child::<M>(slot);
-        let range = touched::range(prepared, &chart.footprint(cell), last);
+        let footprint = chart.footprint(cell);
+        let range = touched::range(prepared, &footprint, last);
         if last || range.is_constant() {
-            node.set_average(slot, leaf(prepared, chart, cell, range));
+            node.set_average(slot, average(prepared, &footprint, range));
         } else {
             next.push(Open { cell, range, node: index, slot });
         }
     }
     pool.push(node);
-}
-
-fn leaf(prepared: &Prepared<'_>, chart: &Chart, cell: Cell, range: Range) -> f32 {
-    if range.is_constant() {
-        return storable(f64::from(range.max));
-    }
-    let footprint = chart.footprint(cell);
-    average(prepared, &footprint, touched::range(prepared, &footprint, true))
 }
 
 /// Keeps the `room` cells with the largest contrast, in their order; the others become leaves.
@@ -189,5 +199,7 @@ fn sum_up<const M: usize>(pool: &mut [Node<M>], start: usize) -> f32 {
     storable(pool[start].mean())
 }
 
+#[cfg(test)]
+mod sizes;
 #[cfg(test)]
 mod tests;

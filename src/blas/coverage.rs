@@ -18,11 +18,12 @@ pub(crate) const MAX_AVERAGE: f32 = 1e30;
 /// It stands in for what rounding, and the blocks of a large footprint, can miss.
 const FLOOR: f64 = 1e-6;
 
-/// Footprints in boxes of up to this many texels to a side are integrated exactly.
-const EXACT_SIDE: f64 = 32.0;
+/// Footprints of up to about this many texels are integrated exactly. Leaves are far smaller, unless a triangle ran
+/// out of its budget.
+const EXACT_TEXELS: f64 = 48.0;
 
 /// Larger ones are integrated over a level of the pyramid that has up to this many blocks to a side.
-const BLOCKS: f64 = 16.0;
+const BLOCKS: f64 = 8.0;
 
 /// A triangle is taken for a line when its area is this share of its longest edge's square.
 const LINE: f64 = 1e-9;
@@ -30,22 +31,21 @@ const LINE: f64 = 1e-9;
 /// The average over a footprint in which look-ups lie in `range`, from 0 to [`MAX_AVERAGE`].
 ///
 /// It is zero exactly where the whole touched range is black. Otherwise it is a normal number between the range's
-/// ends, and exact (up to rounding, and up to a floor of a millionth of the brightest texel) for footprints within
-/// 32 x 32 texels.
+/// ends, and exact (up to rounding, and up to a floor of a millionth of the brightest texel) for footprints of up to
+/// about 48 texels.
 pub(crate) fn average(prepared: &Prepared<'_>, footprint: &Footprint, range: Range) -> f32 {
     if range.is_constant() {
         return storable(f64::from(range.max));
     }
-    let side = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
     let longest = footprint.corners.iter().fold(0.0f64, |m, p| {
         let q = footprint.corners[0];
         m.max((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]))
     });
     let line = footprint.double_area() <= LINE * longest;
-    let mean = if side > EXACT_SIDE {
-        blocks(prepared, footprint, line)
-    } else if line {
+    let mean = if line {
         looked_up(prepared, footprint)
+    } else if texels(footprint) > EXACT_TEXELS {
+        blocks(prepared, footprint)
     } else {
         match prepared.texture().filtering() {
             Filter::Nearest => nearest(prepared, footprint),
@@ -55,6 +55,12 @@ pub(crate) fn average(prepared: &Prepared<'_>, footprint: &Footprint, range: Ran
     let (min, max) = (f64::from(range.min), f64::from(range.max));
     // NaN, from a footprint that lost its area to rounding, becomes the floor here.
     storable(mean.max(FLOOR * max).clamp(min, max))
+}
+
+/// About how many texels a footprint meets: those inside, and those along its rim.
+fn texels(footprint: &Footprint) -> f64 {
+    let side = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
+    0.5 * footprint.double_area() + 2.0 * side
 }
 
 /// Narrows to what nodes hold: zero, or a normal `f32` up to [`MAX_AVERAGE`].
@@ -137,12 +143,16 @@ fn looked_up(prepared: &Prepared<'_>, footprint: &Footprint) -> f64 {
 /// A block of the pyramid along one axis, and what it covers.
 struct Piece {
     block: u32,
+    /// Texels of the block that count.
+    texels: [u32; 2],
+    /// Set if a single texel holds for the whole piece.
+    held: Option<u32>,
     interval: [f64; 2],
 }
 
 /// The integral over a level of the pyramid as if its blocks were texels. Ignores the half texel that bilinear
-/// look-up blurs a block's edge by. A line, and a footprint over many copies of the image, becomes its box.
-fn blocks(prepared: &Prepared<'_>, footprint: &Footprint, line: bool) -> f64 {
+/// look-up blurs a block's edge by. A footprint over many copies of the image becomes its box.
+fn blocks(prepared: &Prepared<'_>, footprint: &Footprint) -> f64 {
     let texture = prepared.texture();
     let size = texture.size();
     let columns_and_rows: [SmallVec<[Stretch; 4]>; 2] = core::array::from_fn(|k| {
@@ -155,7 +165,7 @@ fn blocks(prepared: &Prepared<'_>, footprint: &Footprint, line: bool) -> f64 {
     while level < prepared.top() && span[0].max(span[1]) > BLOCKS * f64::from(1 << level) {
         level += 1;
     }
-    let as_box = line || columns_and_rows.iter().flatten().any(Stretch::is_all_periods);
+    let as_box = columns_and_rows.iter().flatten().any(Stretch::is_all_periods);
     let [columns, rows] = [0, 1].map(|k| pieces(&columns_and_rows[k], level, [footprint.lo[k], footprint.hi[k]]));
     let polygon = Polygon::triangle(footprint.corners);
     let (mut sum, mut total) = (0.0, 0.0);
@@ -165,11 +175,27 @@ fn blocks(prepared: &Prepared<'_>, footprint: &Footprint, line: bool) -> f64 {
         for column in &columns {
             let [x0, x1] = column.interval;
             let area = if as_box { (x1 - x0) * (y1 - y0) } else { strip.clip(0, x0, x1).area() };
-            sum += area * f64::from(prepared.block(level, column.block, row.block).mean);
+            sum += area * mean(prepared, level, column, row);
             total += area;
         }
     }
     sum / total
+}
+
+/// The mean over a block. Beyond a clamped edge, that over up to eight texels of the edge.
+fn mean(prepared: &Prepared<'_>, level: u32, column: &Piece, row: &Piece) -> f64 {
+    let texel = |x: u32, y: u32| f64::from(prepared.texture().texel(x, y));
+    let along = |[first, last]: [u32; 2], at: &dyn Fn(u32) -> f64| {
+        let count = (last - first + 1).min(8);
+        let texel = |i: u32| first + (2 * i + 1) * (last - first + 1) / (2 * count);
+        (0..count).map(|i| at(texel(i))).sum::<f64>() / f64::from(count)
+    };
+    match (column.held, row.held) {
+        (None, None) => f64::from(prepared.block(level, column.block, row.block).mean),
+        (Some(x), None) => along(row.texels, &|y| texel(x, y)),
+        (None, Some(y)) => along(column.texels, &|x| texel(x, y)),
+        (Some(x), Some(y)) => texel(x, y),
+    }
 }
 
 fn pieces(stretches: &[Stretch], level: u32, span: [f64; 2]) -> SmallVec<[Piece; 24]> {
@@ -184,10 +210,10 @@ fn pieces(stretches: &[Stretch], level: u32, span: [f64; 2]) -> SmallVec<[Piece;
             } else {
                 let [lo, hi] = stretch.interval(first, last);
                 let lo = lo.max(span[0]);
-                // A line along the other axis still has a width here.
+                // A sliver still has a width here.
                 [lo, hi.min(span[1]).max(lo + 1e-6)]
             };
-            out.push(Piece { block, interval });
+            out.push(Piece { block, texels: [first, last], held: stretch.held_texel(), interval });
         }
     }
     out

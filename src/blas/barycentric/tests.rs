@@ -70,8 +70,9 @@ fn paths<const M: usize>(seed: u64) {
             (local, size) = (next, size >> level_halvings::<M>());
         }
         assert_eq!(local, inner);
-        for corner in cell.corners() {
+        for (corner, b) in cell.corners().into_iter().zip(cell.corner_barycentrics()) {
             assert_eq!(corner.0.iter().sum::<u32>(), LATTICE);
+            assert_eq!(Lattice::from_barycentrics(b), corner);
         }
     }
 }

@@ -49,7 +49,7 @@ fn compare(texture: Texture<'_>, uv: [Vec2; 3], tolerance: f64) {
     let (found, range) = average_of(&prepared, uv);
     let (mean, min, max) = brute_force(&texture, uv, 160);
     let spread = f64::from(range.max - range.min);
-    assert!((found - mean).abs() <= tolerance * spread + 1e-6 * mean, "{found} is not {mean}: {texture:?} {uv:?}");
+    assert!((found - mean).abs() <= tolerance * spread + 1e-6 * mean, "{found} is not {mean}: {uv:?} {texture:?}");
     assert!(
         f64::from(range.min) <= min * (1.0 + 1e-9) && max <= f64::from(range.max) * (1.0 + 1e-9),
         "{texture:?} {uv:?}"
@@ -61,13 +61,15 @@ fn averages_are_those_of_many_look_ups() {
     let mut rng = Pcg::new(5, 5);
     for round in 0..300 {
         let (w, h) = (1 + rng.below(9) as usize, 1 + rng.below(9) as usize);
-        let texels: Vec<f32> = (0..w * h).map(|_| rng.f32() * rng.f32()).collect();
+        let image: Vec<f32> = (0..w * h).map(|_| rng.f32() * rng.f32()).collect();
         let (u, v) = (WRAPS[round % 3], WRAPS[round / 3 % 3]);
-        let scale = [0.3, 1.0, 1.7][round % 7 % 3];
+        let scale = [0.3, 0.6, 1.7][round % 7 % 3];
         let uv = random_uv(&mut rng, scale);
-        let texture = Texture::new(w, h, &texels).unwrap().wrap(u, v);
-        compare(texture, uv, 2e-3);
-        compare(texture.filter(Filter::Nearest), uv, 2e-2);
+        let texture = Texture::new(w, h, &image).unwrap().wrap(u, v);
+        // Beyond, blocks stand in for texels.
+        let exact = texels(&Chart::new(&texture, uv).footprint(Cell::root())) <= EXACT_TEXELS;
+        compare(texture, uv, if exact { 2e-3 } else { 1e-1 });
+        compare(texture.filter(Filter::Nearest), uv, if exact { 2e-2 } else { 1e-1 });
         // A line and a point.
         compare(texture, [uv[0], uv[1], uv[0].midpoint(uv[1])], 5e-2);
         compare(texture, [uv[0]; 3], 1e-6);
