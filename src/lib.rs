@@ -6,6 +6,7 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+mod env;
 mod error;
 mod geometry;
 mod math;
@@ -14,5 +15,6 @@ mod record;
 mod testing;
 mod warp;
 
+pub use env::{Environment, EnvironmentHeader, EnvironmentSample, EnvironmentView};
 pub use error::Error;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
