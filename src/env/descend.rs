@@ -4,7 +4,7 @@ use super::pyramid::children;
 use super::rotation::to_world;
 use super::view::EnvironmentView;
 use crate::warp::equal_area::{SPHERE, square_to_sphere};
-use crate::warp::{Variate, pick, seed};
+use crate::warp::{Variate, pick_pair, seed};
 use glam::{Vec2, Vec3};
 
 /// How close to its texel's edge a sample may come, in units of the square.
@@ -42,10 +42,9 @@ impl EnvironmentView<'_> {
         let (mut x, mut y) = (0, 0);
         for depth in 0..self.header.depth {
             let [a, b, c, d] = children(self.means, depth, x, y);
-            let rows = [a + b, c + d];
-            let j = pick(&rows, f64::from(rows[0]) + f64::from(rows[1]), &mut row);
+            let j = pick_pair([a + b, c + d], &mut row);
             let columns = if j == 0 { [a, b] } else { [c, d] };
-            let i = pick(&columns, f64::from(columns[0]) + f64::from(columns[1]), &mut column);
+            let i = pick_pair(columns, &mut column);
             (x, y) = (2 * x + i as u32, 2 * y + j as u32);
         }
         let point = Vec2::new(self.inside(x, column.value_f32()), self.inside(y, row.value_f32()));
