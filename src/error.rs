@@ -18,6 +18,8 @@ pub(crate) enum Kind {
     TexelCount { what: &'static str, width: usize, height: usize, found: usize },
     /// A texel that is NaN, infinite or, where that is an error, negative.
     Texel { what: &'static str, x: usize, y: usize, value: f32 },
+    /// A texel too large for the sums and products that it goes into.
+    TexelTooBright { what: &'static str, x: usize, y: usize, value: f32, limit: f32 },
     /// A scalar that is NaN, infinite or out of its range.
     Scalar { what: &'static str, value: f32, expected: &'static str },
     /// A rotation that is not orthonormal.
@@ -51,6 +53,9 @@ impl fmt::Display for Error {
             }
             Kind::Texel { what, x, y, value } => {
                 write!(f, "{what}: texel ({x}, {y}) is {value}, but must be finite and not negative")
+            }
+            Kind::TexelTooBright { what, x, y, value, limit } => {
+                write!(f, "{what}: texel ({x}, {y}) is {value:e}, but must be at most {limit:e}")
             }
             Kind::Scalar { what, value, expected } => write!(f, "{what} is {value}, but must be {expected}"),
             Kind::Rotation { determinant } => {

@@ -8,6 +8,7 @@ extern crate std;
 
 #[cfg_attr(not(test), expect(dead_code, reason = "the lights are to use it"))]
 mod blas;
+mod env;
 mod error;
 mod geometry;
 mod math;
@@ -17,5 +18,6 @@ mod testing;
 mod warp;
 
 pub use blas::Texture;
+pub use env::{Environment, EnvironmentHeader, EnvironmentSample, EnvironmentView};
 pub use error::Error;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};

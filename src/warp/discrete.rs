@@ -27,9 +27,20 @@ pub(crate) fn pick<const N: usize>(weights: &[f32; N], total: f64, variate: &mut
             }
         }
     }
-    let scale = 1.0 / total;
-    variate.rescale(low * scale, f64::from(weights[chosen]) * scale);
+    variate.stretch(target - low, f64::from(weights[chosen]), total);
     chosen
+}
+
+/// [`pick`] of two weights, without branches.
+#[inline]
+pub(crate) fn pick_pair([first, second]: [f32; 2], variate: &mut Variate) -> usize {
+    let (first, second) = (f64::from(first), f64::from(second));
+    let total = first + second;
+    let target = variate.value() * total;
+    let upper = target >= first && second > 0.0;
+    let (low, width) = if upper { (first, second) } else { (0.0, first) };
+    variate.stretch(target - low, width, total);
+    usize::from(upper)
 }
 
 #[cfg(test)]
@@ -75,6 +86,19 @@ mod tests {
             let mut v = Variate::new(u, 1);
             assert_eq!(pick(&[0.0; 4], 0.0, &mut v), 0);
             assert!((0.0..1.0).contains(&v.value()));
+        }
+    }
+
+    #[test]
+    fn a_pair_is_picked_as_two_weights_are() {
+        let mut pcg = Pcg32::new(6, 5);
+        for i in 0..100_000 {
+            let mut weights = [pcg.next_f32(), pcg.next_f32()];
+            weights[i % 2] *= [1.0, 0.0, 1e-20][i % 3];
+            let mut a = Variate::new(pcg.next_f32(), i as u64);
+            let mut b = a;
+            assert_eq!(pick(&weights, sum(&weights), &mut a), pick_pair(weights, &mut b));
+            assert_eq!(a.value(), b.value());
         }
     }
 

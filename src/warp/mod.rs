@@ -1,8 +1,9 @@
 //! Maps between the unit square, where random numbers live, and the domains that are sampled.
 
 pub(crate) mod discrete;
+pub(crate) mod equal_area;
 pub(crate) mod triangle;
 pub(crate) mod variate;
 
-pub(crate) use discrete::pick;
+pub(crate) use discrete::{pick, pick_pair, sum};
 pub(crate) use variate::{Variate, seed};

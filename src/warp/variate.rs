@@ -63,9 +63,16 @@ impl Variate {
     /// A value outside of it through rounding is clamped. `width` must be above zero.
     #[inline]
     pub(crate) fn rescale(&mut self, low: f64, width: f64) {
+        self.stretch(self.value - low, width, 1.0);
+    }
+
+    /// [`rescale`](Self::rescale) in other units: the value is `offset` above the low end of an interval of size
+    /// `width`, out of `total` that stand for the whole unit interval.
+    #[inline]
+    pub(crate) fn stretch(&mut self, offset: f64, width: f64, total: f64) {
         // `max` first: it also swallows the NaN of 0 / 0.
-        self.value = ((self.value - low) / width).max(0.0).min(ALMOST_ONE);
-        self.spent *= width;
+        self.value = (offset / width).max(0.0).min(ALMOST_ONE);
+        self.spent *= width / total;
         // Negated, so that a NaN `spent` is mended too.
         if !(self.spent >= REFILL_BELOW) {
             self.refill();

@@ -1,0 +1,78 @@
+//! Sampling a direction of the environment in proportion to its radiance, and the density of that.
+
+use super::pyramid::children;
+use super::rotation::to_world;
+use super::view::EnvironmentView;
+use crate::warp::equal_area::{SPHERE, square_to_sphere};
+use crate::warp::{Variate, pick_pair, seed};
+use glam::{Vec2, Vec3};
+
+/// How close to its texel's edge a sample may come, in units of the square.
+///
+/// Twice what the way to the sphere, through the rotation and back can move a point: the direction of a sample
+/// falls into the texel that it was drawn from. The samples that are moved for it are moved by less than 3e-6
+/// radians.
+const MARGIN: f32 = 1e-6;
+
+/// A direction drawn from the environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvironmentSample {
+    /// Unit world direction, away from the viewer.
+    pub direction: Vec3,
+    /// Radiance along the direction. Above zero.
+    pub radiance: f32,
+    /// Density of the direction per solid angle. Finite and above zero.
+    pub pdf: f32,
+}
+
+impl EnvironmentView<'_> {
+    /// Draws a direction with a density in proportion to its radiance. `None` if the environment is black.
+    ///
+    /// `u` holds two uniform numbers in `[0, 1)`. A stratified set of them gives a stratified set of directions:
+    /// at each level of the pyramid the second number chooses the row and the first one the column (two-dimensional
+    /// hierarchical warp, Clarberg et al. 2005, "Wavelet Importance Sampling").
+    #[inline]
+    pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
+        if self.header.mean <= 0.0 {
+            return None;
+        }
+        let salt = seed(&u);
+        let mut column = Variate::new(u[0], salt);
+        let mut row = Variate::new(u[1], !salt);
+        let (mut x, mut y) = (0, 0);
+        for depth in 0..self.header.depth {
+            let [a, b, c, d] = children(self.means, depth, x, y);
+            let j = pick_pair([a + b, c + d], &mut row);
+            let columns = if j == 0 { [a, b] } else { [c, d] };
+            let i = pick_pair(columns, &mut column);
+            (x, y) = (2 * x + i as u32, 2 * y + j as u32);
+        }
+        let point = Vec2::new(self.inside(x, column.value_f32()), self.inside(y, row.value_f32()));
+        let direction = to_world(&self.header.rotation, square_to_sphere(point));
+        let radiance = self.mean_at(self.header.depth, x, y);
+        Some(EnvironmentSample { direction, radiance, pdf: self.pdf_of(radiance) })
+    }
+
+    /// Density, per solid angle, with which [`sample`](Self::sample) draws a unit world direction.
+    #[inline]
+    pub fn pdf(&self, direction: Vec3) -> f32 {
+        if self.header.mean <= 0.0 { 0.0 } else { self.pdf_of(self.radiance(direction)) }
+    }
+
+    /// Density of the directions of a texel with this radiance.
+    ///
+    /// The choices of the descent telescope: the product of `child / (sum of four children)` over the levels is
+    /// the texel's share of the whole, as every mean is a quarter of that sum.
+    #[inline]
+    fn pdf_of(&self, radiance: f32) -> f32 {
+        radiance / (self.header.mean * SPHERE)
+    }
+
+    /// Coordinate in the square of a place in a texel, kept off the texel's edges.
+    #[inline]
+    fn inside(&self, texel: u32, place: f32) -> f32 {
+        let side = 1.0 / (1_u32 << self.header.depth) as f32;
+        let low = texel as f32 * side;
+        ((texel as f32 + place) * side).max(low + MARGIN).min(low + side - MARGIN)
+    }
+}

@@ -1,0 +1,138 @@
+//! How bright a region of directions is: an estimate that never calls a region black that is not.
+//!
+//! Two looks are taken. The *talk's* (Ogaki 2020, "MIP Maps for Environment Map"): the nearest texel of a 3x3
+//! filtered level whose filter is as large as the region's solid angle. It is the better estimate, but a texel
+//! of it may miss what lies in the region. The *cover*: at most 2x2 texels of a level that are sure to hold the
+//! whole region. It decides about black and constant, and adds a small share to the estimate so that nothing
+//! bright is lost.
+//!
+//! Why the cover covers: a geodesic from the region's centre to any of its points is at most as long as the
+//! region's angular radius ρ. Its image in the plane that is tiled by rotated copies of the square is a
+//! continuous path (`wrap_texel`), no coordinate of which moves by more than `STRETCH · ρ`. So the image ends in
+//! the box of that half side around the centre, and the texels that the box touches, wrapped, hold the point.
+
+use super::pyramid::level_start;
+use super::rotation::to_local;
+use super::view::EnvironmentView;
+use crate::warp::equal_area::{SPHERE, STRETCH, sphere_to_square, wrap_texel_log2};
+use glam::Vec3;
+
+/// Share of the cover's mean in the estimate.
+///
+/// The variance that a bright spot causes which the talk's look-up misses grows with its inverse; where that
+/// look-up is right, it costs its share of the samples.
+const DEFENSIVE: f32 = 0.02;
+
+/// Slack of the box for the rounding of the map (2.5e-7 at worst), of the rotation and of the direction.
+const ROUNDING: f32 = 1e-6;
+
+/// A region of directions.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Footprint {
+    /// Unit world direction of the axis of a cone that holds the region.
+    pub(crate) direction: Vec3,
+    /// Sine of the cone's angular radius. From 1 on it holds everything.
+    pub(crate) sin_radius: f32,
+    /// Solid angle of the region itself.
+    pub(crate) solid_angle: f32,
+}
+
+/// How bright a region is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Average {
+    /// Estimate of the mean radiance. Zero only if the whole region is black.
+    pub(crate) value: f32,
+    /// Whether the whole region is known to have the radiance `value`.
+    pub(crate) constant: bool,
+}
+
+/// What is known of a region by a few texels that hold it.
+struct Cover {
+    mean: f32,
+    min: f32,
+    max: f32,
+}
+
+impl EnvironmentView<'_> {
+    /// Estimates the mean radiance of a region.
+    #[inline]
+    pub(crate) fn average(&self, region: &Footprint) -> Average {
+        if self.is_constant() {
+            return Average { value: self.header.mean, constant: true };
+        }
+        let center = sphere_to_square(to_local(&self.header.rotation, region.direction));
+        let cover = self.cover(center.x, center.y, region.sin_radius);
+        if cover.min == cover.max {
+            return Average { value: cover.max, constant: true };
+        }
+        let depth = self.depth_of_solid_angle(region.solid_angle);
+        let scale = (1_u32 << depth) as f32;
+        let last = (1 << depth) - 1;
+        let (x, y) = (((center.x * scale) as u32).min(last), ((center.y * scale) as u32).min(last));
+        let talk = self.filtered[level_start(depth) + ((y << depth) | x) as usize];
+        let value = (1.0 - DEFENSIVE) * talk + DEFENSIVE * cover.mean;
+        Average { value: value.max(f32::MIN_POSITIVE), constant: false }
+    }
+
+    /// Mean, minimum and maximum over texels that hold a cone around a point of the square.
+    #[inline]
+    fn cover(&self, x: f32, y: f32, sin_radius: f32) -> Cover {
+        let half = STRETCH * asin_bound(sin_radius) + ROUNDING;
+        let depth = self.depth_of_side(2.0 * half);
+        if depth == 0 {
+            let [min, max] = self.ranges[0];
+            return Cover { mean: self.header.mean, min, max };
+        }
+        let size = 1_i32 << depth;
+        let scale = size as f32;
+        // From depth 1 on `half` is below 1/2: shifted by one, the coordinates are positive, and the cast is the
+        // floor.
+        let texel = |coordinate: f32| ((coordinate + 1.0) * scale) as i32 - size;
+        let (x0, x1, y0, y1) = (texel(x - half), texel(x + half), texel(y - half), texel(y + half));
+        let (mut sum, mut count) = (0.0, 0.0);
+        let (mut min, mut max) = (f32::INFINITY, 0.0_f32);
+        for j in y0..=y1 {
+            for i in x0..=x1 {
+                let (i, j) = wrap_texel_log2(i, j, depth);
+                let [low, high] = self.range_at(depth, i, j);
+                (min, max) = (min.min(low), max.max(high));
+                sum += self.mean_at(depth, i, j);
+                count += 1.0;
+            }
+        }
+        Cover { mean: sum / count, min, max }
+    }
+
+    /// Depth of the finest level whose texels are at least as wide as `side`, so that it touches 2x2 at most.
+    #[inline]
+    fn depth_of_side(&self, side: f32) -> u32 {
+        // A little more than `side`: where both are equal, rounding could make it three texels.
+        floor_log2(1.0 / (1.002 * side)).clamp(0, self.header.depth as i32) as u32
+    }
+
+    /// Depth of the level whose 3x3 filter is nearest to a solid angle, Ω = min(4π, 9 · 4π / 4^depth).
+    #[inline]
+    fn depth_of_solid_angle(&self, solid_angle: f32) -> u32 {
+        // Rounding log4(q) to nearest is flooring log4(2 q) = log2(2 q) / 2. Zero and NaN give the finest level.
+        let q = 9.0 * SPHERE / solid_angle.max(f32::MIN_POSITIVE);
+        (floor_log2(2.0 * q) >> 1).clamp(0, self.header.depth as i32) as u32
+    }
+}
+
+/// Upper bound on asin, above it by at most 13 %, for `sine` in `[0, 1)`. A full turn for all other values.
+#[inline]
+fn asin_bound(sine: f32) -> f32 {
+    // (asin(s) - s - s³/6) / s⁵ grows from 3/40 to π/2 - 7/6 = 0.4041.
+    let s = sine.max(0.0);
+    let square = s * s;
+    if sine < 1.0 { s * (1.0 + square * (1.0 / 6.0 + 0.4042 * square)) } else { core::f32::consts::TAU }
+}
+
+/// Floor of the base-2 logarithm of a positive number, from its exponent.
+#[inline]
+fn floor_log2(x: f32) -> i32 {
+    (x.to_bits() >> 23) as i32 - 127
+}
+
+#[cfg(test)]
+mod tests;

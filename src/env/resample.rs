@@ -1,0 +1,63 @@
+//! From a host's image to an equal-area image whose size is a power of two, by area: no flux is lost.
+
+use super::lat_long::LatLong;
+use super::source::{Edges, Source};
+use super::{BRIGHTEST, DARKEST};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// Means of the source over the texels of an equal-area image of `2^depth` texels a side, `depth` at least 1.
+///
+/// A texel that shares any area with a lit cell is lit.
+pub(super) fn resample(source: &Source, edges: Edges, depth: u32) -> Vec<f32> {
+    let size = 1_usize << depth;
+    match edges {
+        Edges::LatLong => {
+            let source = LatLong::new(source);
+            fill(size, |x, y| source.texel(x, y, size))
+        }
+        Edges::EqualArea => fill(size, |x, y| box_mean(source, x, y, size)),
+    }
+}
+
+/// Mean over the cells of an equal-area source that a texel overlaps.
+fn box_mean(source: &Source, x: usize, y: usize, size: usize) -> f64 {
+    let cells = source.columns();
+    let (mut flux, mut area) = (0.0, 0.0);
+    for (row, height) in overlaps(y, size, cells) {
+        for (column, width) in overlaps(x, size, cells) {
+            flux += width * height * source.cell(column, row);
+            area += width * height;
+        }
+    }
+    flux / area
+}
+
+/// Cells that a texel overlaps along one axis, and by how much, in units of the side over `cells * size`.
+fn overlaps(texel: usize, size: usize, cells: usize) -> impl Iterator<Item = (usize, f64)> {
+    // Exact: at most 2^13 by 2^17.
+    let (start, end) = (texel as u64 * cells as u64, (texel as u64 + 1) * cells as u64);
+    let size = size as u64;
+    (start / size..end.div_ceil(size))
+        .map(move |cell| (cell as usize, (end.min((cell + 1) * size) - start.max(cell * size)) as f64))
+}
+
+/// Computes all texels, in parallel with the feature `rayon`. Each one is computed alone: the result does not
+/// depend on the number of threads.
+fn fill(size: usize, texel: impl Fn(usize, usize) -> f64 + Sync) -> Vec<f32> {
+    let mut image = vec![0.0; size * size];
+    let fill_row = |(y, row): (usize, &mut [f32])| {
+        for (x, out) in row.iter_mut().enumerate() {
+            let mean = texel(x, y);
+            *out = if mean > 0.0 { (mean as f32).clamp(DARKEST, BRIGHTEST) } else { 0.0 };
+        }
+    };
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        image.par_chunks_mut(size).enumerate().for_each(fill_row);
+    }
+    #[cfg(not(feature = "rayon"))]
+    image.chunks_mut(size).enumerate().for_each(fill_row);
+    image
+}

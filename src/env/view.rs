@@ -1,0 +1,141 @@
+//! The borrowed form of an environment, which holds all look-ups.
+
+use super::pyramid::{Pyramid, level_start};
+use super::rotation::to_local;
+use crate::warp::equal_area::{SPHERE, sphere_to_square};
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat3, Vec3};
+
+/// The fixed part of an environment, plain data.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct EnvironmentHeader {
+    /// Columns of the rotation from the environment's frame to the world. Orthonormal, determinant 1.
+    pub rotation: [[f32; 3]; 3],
+    /// Base-2 logarithm of the number of texels a side, `0..=13`. Zero: constant radiance.
+    pub depth: u32,
+    /// Mean radiance over the sphere. `0` or in `[1e-38, 1e30]`.
+    pub mean: f32,
+    /// Largest radiance of a texel. `0` or in `[1e-30, 1e30]`.
+    pub max: f32,
+    /// Number of negative texels of the input, all clamped to zero.
+    pub clamped_texels: u32,
+    /// Zero.
+    pub padding: u32,
+}
+
+const _: () = assert!(size_of::<EnvironmentHeader>() == 56);
+
+/// An environment whose data is borrowed: from an [`Environment`](crate::Environment), or from bytes that were
+/// loaded or mapped.
+///
+/// Everything that is looked up or sampled is defined here. Directions point away from the viewer; all
+/// densities are per solid angle.
+#[derive(Clone, Copy, Debug)]
+pub struct EnvironmentView<'a> {
+    pub(super) header: EnvironmentHeader,
+    /// Means of all levels, the coarsest (one texel) first, rows from the square's `y = 0`.
+    pub(super) means: &'a [f32],
+    /// Minimum and maximum of all levels but the finest, laid out like `means`.
+    pub(super) ranges: &'a [[f32; 2]],
+    /// 3x3 box-filtered means of all levels, laid out like `means`.
+    pub(super) filtered: &'a [f32],
+}
+
+impl<'a> EnvironmentView<'a> {
+    pub(super) fn from_pyramid(header: EnvironmentHeader, pyramid: &'a Pyramid) -> Self {
+        Self { header, means: &pyramid.means, ranges: &pyramid.ranges, filtered: &pyramid.filtered }
+    }
+
+    /// The fixed part, to be stored with the slices.
+    pub fn header(&self) -> &EnvironmentHeader {
+        &self.header
+    }
+
+    /// Means of all levels of the pyramid, the coarsest first.
+    pub fn means(&self) -> &'a [f32] {
+        self.means
+    }
+
+    /// Minimum and maximum of all levels of the pyramid but the finest, the coarsest first.
+    pub fn ranges(&self) -> &'a [[f32; 2]] {
+        self.ranges
+    }
+
+    /// 3x3 box-filtered means of all levels of the pyramid, the coarsest first.
+    pub fn filtered_means(&self) -> &'a [f32] {
+        self.filtered
+    }
+
+    /// Mean radiance over the sphere.
+    #[inline]
+    pub fn mean(&self) -> f32 {
+        self.header.mean
+    }
+
+    /// Largest radiance of a texel.
+    #[inline]
+    pub fn max(&self) -> f32 {
+        self.header.max
+    }
+
+    /// Whether every direction has the same radiance.
+    #[inline]
+    pub fn is_constant(&self) -> bool {
+        self.header.depth == 0
+    }
+
+    /// Texels a side of the equal-area image, a power of two. One if the radiance is constant.
+    #[inline]
+    pub fn size(&self) -> u32 {
+        1 << self.header.depth
+    }
+
+    /// Solid angle of one texel: 4π over the number of texels, all of the sphere if the radiance is constant.
+    #[inline]
+    pub fn texel_solid_angle(&self) -> f32 {
+        SPHERE / (1_u64 << (2 * self.header.depth)) as f32
+    }
+
+    /// How many texels of the input were negative and were clamped to zero.
+    pub fn clamped_texels(&self) -> usize {
+        self.header.clamped_texels as usize
+    }
+
+    /// Rotation from the environment's frame to the world.
+    #[inline]
+    pub fn rotation(&self) -> Mat3 {
+        Mat3::from_cols_array_2d(&self.header.rotation)
+    }
+
+    /// Radiance along a unit world direction: the value of the texel that it falls into.
+    #[inline]
+    pub fn radiance(&self, direction: Vec3) -> f32 {
+        if self.is_constant() {
+            return self.header.mean;
+        }
+        let depth = self.header.depth;
+        let point = sphere_to_square(to_local(&self.header.rotation, direction));
+        let scale = (1_u32 << depth) as f32;
+        // The product is exact, and the cast truncates; the square's far edges belong to the last texel.
+        let last = (1 << depth) - 1;
+        let (x, y) = (((point.x * scale) as u32).min(last), ((point.y * scale) as u32).min(last));
+        self.means[level_start(depth) + ((y << depth) | x) as usize]
+    }
+
+    /// Mean of a texel of the level with `2^depth` texels a side.
+    #[inline]
+    pub(super) fn mean_at(&self, depth: u32, x: u32, y: u32) -> f32 {
+        self.means[level_start(depth) + ((y << depth) | x) as usize]
+    }
+
+    /// Minimum and maximum below a texel of the level with `2^depth` texels a side.
+    #[inline]
+    pub(super) fn range_at(&self, depth: u32, x: u32, y: u32) -> [f32; 2] {
+        if depth == self.header.depth {
+            [self.mean_at(depth, x, y); 2]
+        } else {
+            self.ranges[level_start(depth) + ((y << depth) | x) as usize]
+        }
+    }
+}
