@@ -9,6 +9,24 @@ use core::fmt;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Error(pub(crate) Kind);
 
+impl Error {
+    /// Bytes that hold, in the element `at` or at that offset, something else than they should.
+    pub(crate) fn bytes(what: &'static str, at: usize, found: impl TryInto<u64>, expected: impl TryInto<u64>) -> Self {
+        let number = |n: Result<u64, _>| n.unwrap_or(u64::MAX);
+        Self(Kind::Bytes {
+            what,
+            at,
+            found: number(found.try_into().map_err(drop)),
+            expected: number(expected.try_into().map_err(drop)),
+        })
+    }
+
+    /// `Ok` if a count that bytes hold is the expected one.
+    pub(crate) fn unless_equal(what: &'static str, found: usize, expected: usize) -> Result<(), Self> {
+        if found == expected { Ok(()) } else { Err(Self::bytes(what, 0, found, expected)) }
+    }
+}
+
 /// What went wrong, with everything that the message says.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Kind {
@@ -32,8 +50,8 @@ pub(crate) enum Kind {
     Index { mesh: usize, triangle: usize, index: u32, vertices: usize },
     /// A textured mesh without, or with too few, texture coordinates.
     TextureCoordinateCount { mesh: usize, found: usize, vertices: usize },
-    /// A constant weight of a mesh that is NaN, infinite or negative.
-    Weight { mesh: usize, value: f32 },
+    /// A constant weight of a mesh that is NaN, negative or too large.
+    Weight { mesh: usize, value: f32, limit: f32 },
     /// A handle to a texture that this builder did not give out.
     UnknownTexture { mesh: usize, texture: usize, textures: usize },
     /// More of something than its index type can count.
@@ -73,15 +91,15 @@ impl fmt::Display for Error {
             Kind::TextureCoordinateCount { mesh, found, vertices } => {
                 write!(f, "mesh {mesh}: its weight is a texture, but it has {found} uvs for {vertices} vertices")
             }
-            Kind::Weight { mesh, value } => {
-                write!(f, "mesh {mesh}: the weight is {value}, but must be finite and not negative")
+            Kind::Weight { mesh, value, limit } => {
+                write!(f, "mesh {mesh}: the weight is {value}, but must be from 0 to {limit:e}")
             }
             Kind::UnknownTexture { mesh, texture, textures } => {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")
             }
             Kind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             Kind::Bytes { what, at, found, expected } => {
-                write!(f, "bytes: {what} at offset {at} is {found:#x}, expected {expected:#x}")
+                write!(f, "bytes: {what} at {at} is {found:#x}, expected {expected:#x}")
             }
         }
     }

@@ -41,6 +41,15 @@ pub(crate) fn asin(x: f32) -> f32 {
     return libm::asinf(x);
 }
 
+/// Angle of the point `(x, y)` in `[-π, π]`.
+#[inline]
+pub(crate) fn atan2(y: f32, x: f32) -> f32 {
+    #[cfg(feature = "std")]
+    return y.atan2(x);
+    #[cfg(not(feature = "std"))]
+    return libm::atan2f(y, x);
+}
+
 /// Sine and cosine of an angle in radians.
 #[inline]
 pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
@@ -57,15 +66,6 @@ pub(crate) fn cos64(x: f64) -> f64 {
     return x.cos();
     #[cfg(not(feature = "std"))]
     return libm::cos(x);
-}
-
-/// Largest integer not above `x`.
-#[inline(always)]
-pub(crate) fn floor(x: f32) -> f32 {
-    #[cfg(feature = "std")]
-    return x.floor();
-    #[cfg(not(feature = "std"))]
-    return libm::floorf(x);
 }
 
 /// Largest integer not above `x`, in double precision.

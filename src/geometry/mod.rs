@@ -1,1 +1,9 @@
 //! Plain geometry that knows nothing of light.
+
+mod aabb;
+mod cone;
+mod triangle;
+
+pub(crate) use aabb::Aabb;
+pub(crate) use cone::Cone;
+pub(crate) use triangle::{Triangle, intersect};

@@ -1,0 +1,41 @@
+//! Axis-aligned boxes.
+
+use glam::Vec3;
+
+/// An axis-aligned box; empty when a minimum lies above its maximum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Aabb {
+    pub(crate) min: Vec3,
+    pub(crate) max: Vec3,
+}
+
+impl Aabb {
+    /// The box that holds nothing and that every union ignores.
+    pub(crate) const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    /// The smallest box around the points.
+    pub(crate) fn around(points: &[Vec3]) -> Self {
+        points.iter().fold(Self::EMPTY, |aabb, &p| Self { min: aabb.min.min(p), max: aabb.max.max(p) })
+    }
+
+    /// The smallest box around both.
+    pub(crate) fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Edge lengths; zero for the empty box.
+    pub(crate) fn extent(&self) -> Vec3 {
+        (self.max - self.min).max(Vec3::ZERO)
+    }
+
+    /// Centre; halved before adding, so that no finite box overflows.
+    pub(crate) fn center(&self) -> Vec3 {
+        0.5 * self.min + 0.5 * self.max
+    }
+
+    /// Surface area of the box made larger by `pad` along each axis, so that flat boxes still compare.
+    pub(crate) fn padded_area(&self, pad: f32) -> f32 {
+        let e = self.extent() + Vec3::splat(pad);
+        2.0 * (e.x * e.y + e.y * e.z + e.z * e.x)
+    }
+}

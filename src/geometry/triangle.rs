@@ -1,0 +1,86 @@
+//! One triangle, seen from a point.
+
+use glam::{DVec3, Vec3};
+
+use crate::math;
+
+/// Vertices in world space, counter-clockwise around the front side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Triangle(pub(crate) [Vec3; 3]);
+
+impl Triangle {
+    /// Cross product of two edges: normal of the front side times twice the area. In double precision, where the
+    /// differences of coordinates of like size are exact, so that slivers keep their direction.
+    pub(crate) fn double_area_vector(&self) -> DVec3 {
+        let [a, b, c] = self.0.map(Vec3::as_dvec3);
+        (b - a).cross(c - a)
+    }
+
+    /// Unit normal of the front side and area, or `None` where the area is zero.
+    pub(crate) fn normal_and_area(&self) -> Option<(Vec3, f32)> {
+        let cross = self.double_area_vector();
+        let double_area = math::sqrt64(cross.length_squared());
+        let area = (0.5 * double_area) as f32;
+        (area > 0.0 && area.is_finite()).then(|| ((cross / double_area).as_vec3(), area))
+    }
+
+    /// Height of a point over the triangle's plane, positive on the front side, with a sign that can be trusted.
+    pub(crate) fn height(&self, point: Vec3) -> f64 {
+        let cross = self.double_area_vector();
+        let length = math::sqrt64(cross.length_squared());
+        if length > 0.0 { cross.dot(point.as_dvec3() - self.0[0].as_dvec3()) / length } else { 0.0 }
+    }
+
+    /// The vertices relative to a point.
+    pub(crate) fn relative_to(&self, point: Vec3) -> [Vec3; 3] {
+        self.0.map(|vertex| vertex - point)
+    }
+}
+
+/// Barycentrics `b1`, `b2` of the point where the ray from the origin along `direction` crosses the triangle with
+/// these vertices, or `None` if it does not. In double precision, after Möller and Trumbore (1997).
+pub(crate) fn intersect(vertices: [Vec3; 3], direction: Vec3) -> Option<[f32; 2]> {
+    let [a, b, c] = vertices.map(Vec3::as_dvec3);
+    let direction = direction.as_dvec3();
+    let (e1, e2) = (b - a, c - a);
+    let p = direction.cross(e2);
+    let determinant = e1.dot(p);
+    if determinant == 0.0 {
+        return None;
+    }
+    let b1 = -a.dot(p) / determinant;
+    let q = (-a).cross(e1);
+    let b2 = direction.dot(q) / determinant;
+    let t = e2.dot(q) / determinant;
+    (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0).then_some([b1 as f32, b2 as f32])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heights_have_the_side_as_their_sign() {
+        let triangle =
+            Triangle([Vec3::new(1e3, 1e3, 1e3), Vec3::new(1e3 + 1.0, 1e3, 1e3), Vec3::new(1e3, 1e3 + 1.0, 1e3)]);
+        assert!(triangle.height(Vec3::new(1000.25, 1000.25, 1000.0001)) > 0.0);
+        assert!(triangle.height(Vec3::new(1000.25, 1000.25, 999.9999)) < 0.0);
+        assert_eq!(triangle.height(Vec3::new(1000.25, 1000.75, 1000.0)), 0.0);
+        assert_eq!(triangle.normal_and_area(), Some((Vec3::Z, 0.5)));
+    }
+
+    #[test]
+    fn a_triangle_without_area_has_no_normal() {
+        assert_eq!(Triangle([Vec3::X, Vec3::X, Vec3::Y]).normal_and_area(), None);
+        assert_eq!(Triangle([Vec3::ZERO, Vec3::X, Vec3::X * 2.0]).normal_and_area(), None);
+    }
+
+    #[test]
+    fn rays_find_the_barycentrics() {
+        let vertices = [Vec3::new(-1.0, -1.0, 2.0), Vec3::new(3.0, -1.0, 2.0), Vec3::new(-1.0, 3.0, 2.0)];
+        let [b1, b2] = intersect(vertices, Vec3::Z).expect("the ray crosses");
+        assert!((b1 - 0.25).abs() < 1e-7 && (b2 - 0.25).abs() < 1e-7);
+        assert_eq!(intersect(vertices, Vec3::NEG_Z), None);
+        assert_eq!(intersect(vertices, Vec3::X), None);
+    }
+}
