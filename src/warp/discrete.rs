@@ -4,8 +4,39 @@ use crate::warp::variate::Variate;
 
 /// Sum of the weights, in the precision that [`pick`] wants.
 #[inline]
-pub(crate) fn sum<const N: usize>(weights: &[f32; N]) -> f64 {
+pub(crate) fn sum(weights: &[f32]) -> f64 {
     weights.iter().fold(0.0, |sum, &w| sum + f64::from(w))
+}
+
+/// Probability of an index among all: `weights[i] / total`, zero if its weight is.
+#[inline]
+pub(crate) fn pmf(weights: &[f32], i: usize) -> f64 {
+    match weights[i] {
+        0.0 => 0.0,
+        weight => f64::from(weight) / sum(weights),
+    }
+}
+
+/// Share of the largest weight that every possible choice keeps, so that its probability cannot vanish.
+const LEAST_SHARE: f32 = 1e-12;
+
+/// Bounds of a weight, so that sums and quotients of weights stay finite.
+const WEIGHT_RANGE: (f32, f32) = (1e-30, 1e30);
+
+/// Makes every choice that is possible really so, whatever overflow or underflow has made of its weight, and
+/// every other weight zero.
+#[inline]
+pub(crate) fn keep_possible<const N: usize>(weights: &mut [f32; N], possible: impl Fn(usize) -> bool) {
+    let mut largest = 0.0;
+    for (i, weight) in weights.iter_mut().enumerate() {
+        // `max` first: it also swallows the NaN of 0 · ∞.
+        *weight = if possible(i) { weight.max(WEIGHT_RANGE.0).min(WEIGHT_RANGE.1) } else { 0.0 };
+        largest = weight.max(largest);
+    }
+    let least = LEAST_SHARE * largest;
+    for weight in weights.iter_mut().filter(|weight| **weight > 0.0) {
+        *weight = weight.max(least);
+    }
 }
 
 /// Chooses an index in proportion to its weight, and stretches the variate for the next choice.
@@ -14,7 +45,7 @@ pub(crate) fn sum<const N: usize>(weights: &[f32; N]) -> f64 {
 /// `weights[i] / total`, and a weight of zero is never chosen: what rounding leaves over at the end goes to the
 /// last positive weight. Without any positive weight the answer is 0.
 #[inline]
-pub(crate) fn pick<const N: usize>(weights: &[f32; N], total: f64, variate: &mut Variate) -> usize {
+pub(crate) fn pick(weights: &[f32], total: f64, variate: &mut Variate) -> usize {
     let target = variate.value() * total;
     let (mut chosen, mut low, mut below) = (0, 0.0, 0.0);
     for (i, &w) in weights.iter().enumerate() {
@@ -38,7 +69,10 @@ pub(crate) fn pick_pair([first, second]: [f32; 2], variate: &mut Variate) -> usi
     let total = first + second;
     let target = variate.value() * total;
     let upper = target >= first && second > 0.0;
-    let (low, width) = if upper { (first, second) } else { (0.0, first) };
+    // A branch here would be a coin toss for the predictor, and compilers turn a choice between floats into one.
+    // Products with 0 and 1 are exact.
+    let one = f64::from(u8::from(upper));
+    let (low, width) = (first * one, second * one + first * (1.0 - one));
     variate.stretch(target - low, width, total);
     usize::from(upper)
 }
@@ -71,6 +105,17 @@ mod tests {
             degrees += d;
         }
         assert!(statistic < chi_square_limit(degrees), "{statistic} with {degrees} degrees of freedom");
+    }
+
+    #[test]
+    fn possible_weights_stay_possible() {
+        let mut weights = [0.0, f32::INFINITY, f32::NAN, 1.0, 1e-45, 7.0];
+        keep_possible(&mut weights, |i| i != 5);
+        assert!(weights[..5].iter().all(|w| *w > 0.0 && w.is_finite()), "{weights:?}");
+        assert_eq!(weights[5], 0.0);
+        assert!((0..5).all(|i| pmf(&weights, i) > 0.0));
+        assert_eq!(pmf(&weights, 5), 0.0);
+        assert_eq!(pmf(&[0.0; 3], 1), 0.0);
     }
 
     #[test]
