@@ -1,0 +1,20 @@
+//! The top level: a wide bounding volume hierarchy over light triangles.
+//!
+//! It sees bounds and opaque leaf numbers only; what a leaf is, and what light arrives from behind a portal, it
+//! asks of the level above through [`Scene`].
+
+mod build;
+mod collapse;
+mod descend;
+mod importance;
+mod node;
+mod ray;
+mod split;
+#[cfg(test)]
+mod tests;
+mod validate;
+
+pub(crate) use build::build;
+pub(crate) use importance::Scene;
+pub(crate) use node::{MAX_LEAVES, Tlas, TlasView};
+pub use split::Splitting;

@@ -1,0 +1,200 @@
+//! Nodes of the light tree and the buffers they live in.
+
+use alloc::vec::Vec;
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use crate::bounds::LightBounds;
+use crate::math;
+
+/// Marks a child that is a leaf; the other bits below [`TWO_SIDED`] are its number.
+const LEAF: u32 = 1 << 31;
+/// Marks a child that holds a two-sided light.
+const TWO_SIDED: u32 = 1 << 30;
+/// Most leaves that a tree can number.
+pub(crate) const MAX_LEAVES: usize = (1 << 28) - 1;
+/// A lane without a child.
+const EMPTY: u32 = u32::MAX;
+
+/// Widening of a cluster's cone of normals, in radians: covers the rounding of its construction in `f32`.
+const CONE_MARGIN: f32 = 1e-4;
+
+const ROWS: usize = 14;
+const CHILD: usize = 0;
+const MIN: usize = 1;
+const MAX: usize = 4;
+const AXIS: usize = 7;
+const COS: usize = 10;
+const SIN: usize = 11;
+const FLUX: usize = 12;
+const PORTAL: usize = 13;
+
+/// `N` children, one a lane: a row of references, then rows of `f32` bits (the talk's `TLASNode`, with the energy in
+/// two rows: one that arrives the same from everywhere, one to be multiplied by what is seen through a portal).
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Node<const N: usize>([[u32; N]; ROWS]);
+
+/// What a lane of a node refers to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Child {
+    /// Nothing.
+    Empty,
+    /// Another node, by index.
+    Node(u32),
+    /// A leaf, by number.
+    Leaf(u32),
+}
+
+impl<const N: usize> Node<N> {
+    /// A node without children.
+    pub(super) fn empty() -> Self {
+        let mut node = Self([[0; N]; ROWS]);
+        node.0[CHILD] = [EMPTY; N];
+        node
+    }
+
+    /// Writes one child and its bounds.
+    pub(super) fn set(&mut self, lane: usize, child: Child, bounds: &LightBounds) {
+        let side = if bounds.two_sided { TWO_SIDED } else { 0 };
+        self.0[CHILD][lane] = match child {
+            Child::Empty => EMPTY,
+            Child::Node(index) => index | side,
+            Child::Leaf(number) => number | LEAF | side,
+        };
+        let (sin, cos) = math::sin_cos((bounds.normals.theta + CONE_MARGIN).min(core::f32::consts::PI));
+        let mut write = |row: usize, value: f32| self.0[row][lane] = value.to_bits();
+        for axis in 0..3 {
+            write(MIN + axis, bounds.aabb.min[axis]);
+            write(MAX + axis, bounds.aabb.max[axis]);
+            write(AXIS + axis, bounds.normals.axis[axis]);
+        }
+        write(COS, cos);
+        write(SIN, sin.max(0.0));
+        write(FLUX, bounds.flux);
+        write(PORTAL, bounds.portal);
+    }
+
+    pub(super) fn child(&self, lane: usize) -> Child {
+        let reference = self.0[CHILD][lane];
+        match reference {
+            EMPTY => Child::Empty,
+            _ if reference & LEAF != 0 => Child::Leaf(reference & !(LEAF | TWO_SIDED)),
+            _ => Child::Node(reference & !TWO_SIDED),
+        }
+    }
+
+    #[inline(always)]
+    fn value(&self, row: usize, lane: usize) -> f32 {
+        f32::from_bits(self.0[row][lane])
+    }
+
+    #[inline(always)]
+    fn vector(&self, row: usize, lane: usize) -> Vec3 {
+        Vec3::new(self.value(row, lane), self.value(row + 1, lane), self.value(row + 2, lane))
+    }
+
+    #[inline(always)]
+    pub(super) fn two_sided(&self, lane: usize) -> bool {
+        self.0[CHILD][lane] & TWO_SIDED != 0
+    }
+
+    #[inline(always)]
+    pub(super) fn min(&self, lane: usize) -> Vec3 {
+        self.vector(MIN, lane)
+    }
+
+    #[inline(always)]
+    pub(super) fn max(&self, lane: usize) -> Vec3 {
+        self.vector(MAX, lane)
+    }
+
+    #[inline(always)]
+    pub(super) fn axis(&self, lane: usize) -> Vec3 {
+        self.vector(AXIS, lane)
+    }
+
+    /// Cosine and sine of the half angle of the cone of normals.
+    #[inline(always)]
+    pub(super) fn cone(&self, lane: usize) -> (f32, f32) {
+        (self.value(COS, lane), self.value(SIN, lane))
+    }
+
+    #[inline(always)]
+    pub(super) fn flux(&self, lane: usize) -> f32 {
+        self.value(FLUX, lane)
+    }
+
+    #[inline(always)]
+    pub(super) fn portal(&self, lane: usize) -> f32 {
+        self.value(PORTAL, lane)
+    }
+
+    /// Every value of a lane but its reference.
+    pub(super) fn values(&self, lane: usize) -> impl Iterator<Item = f32> + '_ {
+        (CHILD + 1..ROWS).map(move |row| self.value(row, lane))
+    }
+}
+
+/// What splitting needs to know of all leaves below a node: energies relative to the whole tree's.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Spread {
+    /// Number of leaves, as a float, for it is only multiplied.
+    pub(super) count: f32,
+    /// Mean energy of a leaf.
+    pub(super) mean: f32,
+    /// Variance of the energy of the leaves.
+    pub(super) variance: f32,
+}
+
+/// Where the walk from a node or leaf to the root goes on: the lane that refers to it.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(crate) struct Slot(u32);
+
+impl Slot {
+    /// Of the root, which no lane refers to.
+    pub(super) const ROOT: Self = Self(u32::MAX);
+
+    pub(super) fn new<const N: usize>(node: usize, lane: usize) -> Self {
+        Self((node * N + lane) as u32)
+    }
+
+    /// Node and lane, or `None` for the root.
+    #[inline]
+    pub(super) fn get<const N: usize>(self) -> Option<(usize, usize)> {
+        (self != Self::ROOT).then_some((self.0 as usize / N, self.0 as usize % N))
+    }
+}
+
+/// A wide light tree of arity `N`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tlas<const N: usize> {
+    /// The root first; a child always after its parent. Empty where there is no leaf or a single one.
+    pub(crate) nodes: Vec<Node<N>>,
+    /// One a node.
+    pub(crate) parents: Vec<Slot>,
+    /// One a node.
+    pub(crate) spreads: Vec<Spread>,
+    /// One a leaf.
+    pub(crate) leaves: Vec<Slot>,
+}
+
+impl<const N: usize> Tlas<N> {
+    /// The tree as borrowed slices, which all sampling works on.
+    #[inline]
+    pub(crate) fn view(&self) -> TlasView<'_, N> {
+        TlasView { nodes: &self.nodes, parents: &self.parents, spreads: &self.spreads, leaves: &self.leaves }
+    }
+}
+
+/// A light tree in borrowed memory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TlasView<'a, const N: usize> {
+    pub(crate) nodes: &'a [Node<N>],
+    pub(crate) parents: &'a [Slot],
+    pub(crate) spreads: &'a [Spread],
+    pub(crate) leaves: &'a [Slot],
+}

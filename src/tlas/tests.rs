@@ -1,0 +1,255 @@
+//! The tree against plain loops over its leaves.
+
+use alloc::vec::Vec;
+
+use glam::Vec3;
+
+use super::node::{Child, TlasView};
+use super::{Scene, Splitting, Tlas, build};
+use crate::bounds::LightBounds;
+use crate::geometry::{Aabb, Cone};
+use crate::record::ShadingPoint;
+use crate::testing::Pcg32;
+use crate::warp::{Variate, seed};
+
+/// Leaves are all visible, and portals show the same in every direction.
+struct Open;
+
+impl Scene for Open {
+    fn radiance(&self, _center: Vec3, _radius: f32) -> f32 {
+        1.0
+    }
+
+    fn is_visible(&self, _leaf: u32) -> bool {
+        true
+    }
+}
+
+/// Only leaves with odd numbers are visible.
+struct Odd;
+
+impl Scene for Odd {
+    fn radiance(&self, _center: Vec3, _radius: f32) -> f32 {
+        1.0
+    }
+
+    fn is_visible(&self, leaf: u32) -> bool {
+        leaf % 2 == 1
+    }
+}
+
+fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<LightBounds> {
+    let size = 0.3 / (n as f32).cbrt();
+    let light = |_| {
+        let center = Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+        let corner = size * pcg.direction();
+        LightBounds {
+            aabb: Aabb::around(&[center - corner, center + corner]),
+            normals: Cone::single(pcg.direction()),
+            flux: if pcg.next_f32() < 0.5 { pcg.next_f32() } else { 0.0 },
+            portal: pcg.next_f32(),
+            two_sided: pcg.next_f32() < 0.2,
+        }
+    };
+    (0..n).map(light).collect()
+}
+
+fn shading_point(i: usize, pcg: &mut Pcg32) -> ShadingPoint {
+    let position = 2.0 * Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32()) - 0.5;
+    match i % 3 {
+        0 => ShadingPoint::surface(position, pcg.direction()),
+        1 => ShadingPoint::transmissive(position, pcg.direction()),
+        _ => ShadingPoint::volume(position),
+    }
+}
+
+/// Probability of ending below a node where every weight is zero.
+fn dead_mass<const N: usize>(tlas: &TlasView<'_, N>, node: usize, x: &ShadingPoint, scene: &impl Scene) -> f64 {
+    let weights = tlas.nodes[node].weights(x, scene);
+    if weights == [0.0; N] {
+        return 1.0;
+    }
+    let below = |lane| match tlas.nodes[node].child(lane) {
+        Child::Node(index) if weights[lane] > 0.0 => {
+            crate::warp::pmf(&weights, lane) * dead_mass(tlas, index as usize, x, scene)
+        }
+        _ => 0.0,
+    };
+    (0..N).map(below).sum()
+}
+
+fn probabilities_sum_to_one<const N: usize>(scene: &impl Scene) {
+    let mut pcg = Pcg32::new(3, 1);
+    for n in [2, 3, 17, 100, 3000] {
+        let (tlas, _) = build::<N>(&cloud(n, &mut pcg));
+        let view = tlas.view();
+        view.validate().expect("a built tree is valid");
+        for i in 0..12 {
+            let x = shading_point(i, &mut pcg);
+            let leaves: f64 = (0..n as u32).map(|leaf| view.pmf(leaf, &x, scene)).sum();
+            let dead = dead_mass(&view, 0, &x, scene);
+            assert!((leaves + dead - 1.0).abs() < 1e-9, "{n} lights: {leaves} + {dead}");
+        }
+    }
+}
+
+#[test]
+fn leaves_and_dead_ends_have_all_the_probability() {
+    probabilities_sum_to_one::<4>(&Open);
+    probabilities_sum_to_one::<8>(&Open);
+    probabilities_sum_to_one::<16>(&Open);
+    probabilities_sum_to_one::<8>(&Odd);
+}
+
+#[test]
+fn a_sample_has_the_probability_of_its_leaf() {
+    let mut pcg = Pcg32::new(4, 1);
+    let (tlas, _) = build::<8>(&cloud(5000, &mut pcg));
+    let view = tlas.view();
+    for i in 0..20_000 {
+        let x = shading_point(i, &mut pcg);
+        let u = pcg.next_f32();
+        if let Some((leaf, pmf)) = view.sample(&x, &Odd, &mut Variate::new(u, seed(&[u]))) {
+            let again = view.pmf(leaf, &x, &Odd);
+            assert!(leaf % 2 == 1 && (pmf / again - 1.0).abs() < 1e-12, "leaf {leaf}: {pmf} {again}");
+        }
+    }
+}
+
+#[test]
+fn lights_are_a_permutation_in_the_order_of_leaves() {
+    let mut pcg = Pcg32::new(5, 1);
+    for n in [1, 2, 9, 1000] {
+        let (_, order) = build::<8>(&cloud(n, &mut pcg));
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert!(sorted.iter().copied().eq(0..n as u32));
+    }
+}
+
+#[test]
+fn coincident_and_chained_lights_make_shallow_trees() {
+    let mut pcg = Pcg32::new(6, 1);
+    let light = cloud(1, &mut pcg)[0];
+    let same = alloc::vec![light; 100_000];
+    // Each light twice as far and as large as the one before: every binned split takes off the last few.
+    let moved = |i: i32| {
+        let scale = 2.0f32.powi(i / 8 - 40);
+        LightBounds { aabb: Aabb { min: light.aabb.min * scale, max: light.aabb.max * scale }, ..light }
+    };
+    let chain: Vec<_> = (0..640).map(moved).collect();
+    for lights in [same, chain] {
+        let (tlas, _) = build::<4>(&lights);
+        let view = tlas.view();
+        view.validate().expect("a built tree is valid");
+        let depth = (0..lights.len() as u32).map(|leaf| view.path(leaf).count()).max();
+        assert!(depth < Some(70), "{depth:?}");
+    }
+}
+
+#[test]
+fn a_ray_finds_every_box_that_it_crosses() {
+    let mut pcg = Pcg32::new(7, 1);
+    let lights = cloud(2000, &mut pcg);
+    let (tlas, order) = build::<8>(&lights);
+    for i in 0..300 {
+        let origin = shading_point(i, &mut pcg).position;
+        let direction = if i % 5 == 0 { [Vec3::X, Vec3::NEG_Y, Vec3::Z][i % 3] } else { pcg.direction() };
+        let mut found = Vec::new();
+        tlas.view().cross(origin, direction, |leaf| found.push(leaf));
+        for (leaf, &light) in (0..).zip(&order) {
+            if passes_through(origin, direction, &lights[light as usize].aabb) {
+                assert!(found.contains(&leaf), "leaf {leaf} from {origin} along {direction}");
+            }
+        }
+        assert!(found.len() < 400, "{} boxes found", found.len());
+    }
+}
+
+/// Slab test in double precision, shrunk a little so that it decides only clear cases.
+fn passes_through(origin: Vec3, direction: Vec3, aabb: &Aabb) -> bool {
+    let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+    for axis in 0..3 {
+        let (o, d) = (f64::from(origin[axis]), f64::from(direction[axis]));
+        let (low, high) = (f64::from(aabb.min[axis]), f64::from(aabb.max[axis]));
+        if d == 0.0 {
+            if o <= low || o >= high {
+                return false;
+            }
+            continue;
+        }
+        let (a, b) = ((low - o) / d, (high - o) / d);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    enter < leave - 1e-6
+}
+
+fn visits(tlas: &Tlas<8>, x: &ShadingPoint, u: f32, splitting: &Splitting) -> Vec<(u32, f64)> {
+    let mut visits = Vec::new();
+    let variate = |draw| Variate::scrambled(u, u64::from(draw), seed(&[u]) ^ u64::from(draw));
+    tlas.view().sample_split(x, &Odd, splitting, variate, |leaf, count| visits.push((leaf, count)));
+    visits
+}
+
+#[test]
+fn split_visits_have_their_expected_counts() {
+    let mut pcg = Pcg32::new(8, 1);
+    let (tlas, _) = build::<8>(&cloud(500, &mut pcg));
+    let mut most = 0;
+    for i in 0..2000 {
+        let x = shading_point(i, &mut pcg);
+        for splitting in [0.0, 0.3, 0.6, 1.0].map(|threshold| Splitting { threshold, levels: 2 }) {
+            let visits = visits(&tlas, &x, pcg.next_f32(), &splitting);
+            assert!(visits.len() <= 64);
+            most = most.max(visits.len());
+            for (leaf, count) in visits {
+                let again = tlas.view().expected_count(leaf, &x, &Odd, &splitting);
+                assert!((count / again - 1.0).abs() < 1e-12, "leaf {leaf}: {count} {again}");
+            }
+        }
+    }
+    assert!(most > 8, "nothing was split twice");
+}
+
+#[test]
+fn without_splitting_there_is_one_visit_like_a_plain_sample() {
+    let mut pcg = Pcg32::new(9, 1);
+    let (tlas, _) = build::<8>(&cloud(300, &mut pcg));
+    for i in 0..500 {
+        let x = shading_point(i, &mut pcg);
+        for splitting in [Splitting { threshold: 0.0, levels: 9 }, Splitting { threshold: 1.0, levels: 0 }] {
+            let visits = visits(&tlas, &x, pcg.next_f32(), &splitting);
+            assert!(visits.len() <= 1);
+            for (leaf, count) in visits {
+                assert!((count / tlas.view().pmf(leaf, &x, &Odd) - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+}
+
+#[test]
+fn broken_trees_are_refused() {
+    let mut pcg = Pcg32::new(10, 1);
+    let (tlas, _) = build::<4>(&cloud(50, &mut pcg));
+    let word_count = size_of_val(&tlas.nodes[..]) / 4;
+    let mut refused = 0;
+    for word in 0..word_count {
+        let mut broken = tlas.clone();
+        bytemuck::cast_slice_mut::<_, u32>(&mut broken.nodes)[word] ^= 0x8000_0001;
+        // What passes must still be safe to walk.
+        match broken.view().validate() {
+            Err(_) => refused += 1,
+            Ok(()) => {
+                let x = shading_point(word, &mut pcg);
+                broken.view().sample(&x, &Open, &mut Variate::new(pcg.next_f32(), 1));
+                broken.view().cross(x.position, Vec3::ONE, |_| ());
+            }
+        }
+    }
+    assert!(refused > word_count / 20, "{refused} of {word_count}");
+    for length in 0..tlas.leaves.len() {
+        let view = tlas.view();
+        assert!(TlasView { leaves: &tlas.leaves[..length], ..view }.validate().is_err());
+    }
+}

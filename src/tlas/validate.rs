@@ -1,0 +1,59 @@
+//! Checks of a tree that comes from outside, after which no walk can leave it or go round in circles.
+
+use super::node::{Child, Slot, TlasView};
+use crate::error::Error;
+
+impl<const N: usize> TlasView<'_, N> {
+    /// Whether every reference stays inside and points forward, every parent pointer leads back, every leaf is
+    /// referred to once, and every value is finite and in its range.
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        Error::unless_equal("number of parents", self.parents.len(), self.nodes.len())?;
+        Error::unless_equal("number of spreads", self.spreads.len(), self.nodes.len())?;
+        if self.nodes.is_empty() {
+            Error::unless_equal("number of leaves without a node", self.leaves.len().min(2), self.leaves.len().min(1))?;
+            return match self.leaves {
+                [leaf] if *leaf != Slot::ROOT => Err(Error::bytes("parent of the only leaf", 0, 0, 1)),
+                _ => Ok(()),
+            };
+        }
+        let mut leaves = 0;
+        let mut nodes = 1;
+        Error::unless_equal("parent of the root", usize::from(self.parents[0] != Slot::ROOT), 0)?;
+        for index in 0..self.nodes.len() {
+            for lane in 0..N {
+                self.validate_lane(index, lane)?;
+                match self.nodes[index].child(lane) {
+                    Child::Leaf(_) => leaves += 1,
+                    Child::Node(_) => nodes += 1,
+                    Child::Empty => {}
+                }
+            }
+        }
+        // Each lane's child points back to that lane, so as many references as children means each exactly once.
+        Error::unless_equal("references to leaves", leaves, self.leaves.len())?;
+        Error::unless_equal("references to nodes", nodes, self.nodes.len())
+    }
+
+    fn validate_lane(&self, index: usize, lane: usize) -> Result<(), Error> {
+        let node = &self.nodes[index];
+        let here = Slot::new::<N>(index, lane);
+        let slot = match node.child(lane) {
+            Child::Empty => return Ok(()),
+            Child::Leaf(leaf) => self.leaves.get(leaf as usize),
+            Child::Node(child) if child as usize <= index => {
+                return Err(Error::bytes("child node", index, child as usize, index + 1));
+            }
+            Child::Node(child) => self.parents.get(child as usize),
+        };
+        if slot != Some(&here) {
+            return Err(Error::bytes("parent of the child in this lane", index, lane, lane));
+        }
+        if !node.values(lane).all(f32::is_finite) || node.flux(lane) < 0.0 || node.portal(lane) < 0.0 {
+            return Err(Error::bytes("values of this lane", index, lane, lane));
+        }
+        let spread = &self.spreads[index];
+        let finite =
+            [spread.count, spread.mean, spread.variance].iter().all(|value| value.is_finite() && *value >= 0.0);
+        if finite { Ok(()) } else { Err(Error::bytes("spread", index, 0, 0)) }
+    }
+}
