@@ -5,17 +5,27 @@
 //! every triangle with the same texture and coordinates can share it.
 
 mod axis;
-pub(crate) mod barycentric;
-pub(crate) mod build;
+mod barycentric;
+mod build;
+mod cell;
 mod coverage;
-pub(crate) mod footprint;
-pub(crate) mod node;
+mod descend;
+mod footprint;
+mod node;
 mod polygon;
-pub(crate) mod pyramid;
+mod pyramid;
 mod texture;
 mod touched;
 
 #[cfg(test)]
 mod pcg;
 
+pub(crate) use barycentric::Lattice;
+pub(crate) use build::build;
+pub(crate) use cell::Cell;
+pub(crate) use coverage::{MAX_AVERAGE, storable};
+pub(crate) use descend::{Draw, Follow, Shape, Worth, descend};
+pub(crate) use footprint::check_uv;
+pub(crate) use node::{LEAF, Node, Root, validate, validate_roots};
+pub(crate) use pyramid::Prepared;
 pub use texture::Texture;

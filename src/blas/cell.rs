@@ -1,0 +1,81 @@
+//! A cell of a triangle's barycentric domain, with its corners in space.
+
+use glam::Vec3;
+
+use super::barycentric::{self, Place};
+
+/// Which part of the triangle, and where its corners lie relative to the shading point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell {
+    pub(crate) domain: barycentric::Cell,
+    pub(crate) vertices: [Vec3; 3],
+}
+
+impl Cell {
+    /// The whole triangle.
+    #[inline]
+    pub(crate) fn root(vertices: [Vec3; 3]) -> Self {
+        Self { domain: barycentric::Cell::root(), vertices }
+    }
+
+    /// One of the `M` cells of this one, each `1 / M` of its area.
+    #[inline]
+    pub(crate) fn child<const M: usize>(&self, index: usize) -> Self {
+        let r = barycentric::edge_cells::<M>();
+        let Place { a, inverted } = barycentric::place::<M>(index);
+        let step = 1.0 / r as f32;
+        let corner = |k: usize| {
+            let [p0, p1, p2] = core::array::from_fn(|i| {
+                let toward = u32::from(i == k);
+                let along = if inverted { a[i] + 1 - toward } else { a[i] + toward };
+                along as f32 * step
+            });
+            let [v0, v1, v2] = self.vertices;
+            v0 * p0 + v1 * p1 + v2 * p2
+        };
+        Self { domain: self.domain.child::<M>(index), vertices: [corner(0), corner(1), corner(2)] }
+    }
+
+    /// Centroid relative to the shading point.
+    #[inline]
+    pub(crate) fn center(&self) -> Vec3 {
+        let [a, b, c] = self.vertices;
+        (a + b + c) * (1.0 / 3.0)
+    }
+
+    /// Share of the whole triangle's area.
+    #[inline]
+    pub(crate) fn share(&self) -> f32 {
+        let edge = self.domain.size as f32 / barycentric::LATTICE as f32;
+        edge * edge
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The corners in space are those of the exact domain.
+    fn corners_agree<const M: usize>() {
+        let vertices = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(-2.0, 0.5, 1.0), Vec3::new(4.0, -1.0, 0.25)];
+        let mut cell = Cell::root(vertices);
+        for step in 0..4 {
+            for index in 0..M {
+                let child = cell.child::<M>(index);
+                for (corner, [b1, b2]) in child.vertices.iter().zip(child.domain.corner_barycentrics()) {
+                    let expected = vertices[0] * (1.0 - b1 - b2) + vertices[1] * b1 + vertices[2] * b2;
+                    assert!(corner.abs_diff_eq(expected, 2e-6), "{corner} {expected}");
+                }
+            }
+            cell = cell.child::<M>((7 * step + 2) % M);
+        }
+        assert_eq!(cell.share(), (M as f32).powi(-4));
+    }
+
+    #[test]
+    fn corners_in_space_are_those_of_the_domain() {
+        corners_agree::<4>();
+        corners_agree::<16>();
+        corners_agree::<64>();
+    }
+}

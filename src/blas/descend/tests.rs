@@ -1,0 +1,141 @@
+//! The descent against an enumeration of all its ways.
+
+use alloc::vec::Vec;
+
+use glam::{Vec2, Vec3};
+
+use super::*;
+use crate::blas::{Prepared, Texture, build};
+use crate::record::Filter;
+use crate::testing::Pcg32;
+use crate::warp::seed;
+
+/// Worth nothing left of a line; elsewhere the more, the nearer. Ends at a given size.
+struct Halved {
+    smallest: u32,
+}
+
+impl Shape for Halved {
+    fn worth(&self, cell: &Cell) -> Worth {
+        let weight = if cell.vertices.iter().all(|v| v.x < 0.1) { 0.0 } else { 1.0 / cell.center().length_squared() };
+        Worth { weight, uniform: cell.domain.size <= self.smallest }
+    }
+}
+
+/// Follows given indices, then stops choosing: it notes the weights of the first choice that was not given.
+struct Scripted<'a> {
+    script: &'a [usize],
+    next: Option<Vec<f32>>,
+    at: usize,
+}
+
+impl Guide for Scripted<'_> {
+    fn choose<const M: usize>(&mut self, weights: &[f32; M]) -> usize {
+        let index = match self.script.get(self.at) {
+            Some(&index) => index,
+            None => {
+                self.next.get_or_insert_with(|| weights.to_vec());
+                weights.iter().position(|w| *w > 0.0).unwrap_or(0)
+            }
+        };
+        self.at += 1;
+        index
+    }
+}
+
+/// Probability of all leaves, and of all dead ends.
+fn masses<const M: usize>(nodes: &[Node<M>], root: Root, shape: &Halved) -> (f64, f64) {
+    let vertices = [Vec3::new(-1.0, 0.0, 1.0), Vec3::new(1.0, 0.5, 1.5), Vec3::new(0.5, 1.0, 0.75)];
+    let (mut leaves, mut dead) = (0.0, 0.0);
+    let mut open = Vec::from([(Vec::new(), 1.0)]);
+    while let Some((script, mass)) = open.pop() {
+        let mut guide = Scripted { script: &script, next: None, at: 0 };
+        let found = descend(nodes, root, vertices, shape, &mut guide);
+        match (guide.next, found) {
+            (Some(weights), _) => {
+                let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
+                for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                    let mut longer = script.clone();
+                    longer.push(index);
+                    open.push((longer, mass * f64::from(*weight) / total));
+                }
+            }
+            (None, Some((_, pmf))) => {
+                assert!((pmf / mass - 1.0).abs() < 1e-12);
+                leaves += mass;
+            }
+            (None, None) => dead += mass,
+        }
+    }
+    (leaves, dead)
+}
+
+fn tree<const M: usize>(pcg: &mut Pcg32) -> (Vec<Node<M>>, Root) {
+    let texels: Vec<f32> = (0..16 * 16).map(|_| if pcg.next_f32() < 0.2 { pcg.next_f32() } else { 0.0 }).collect();
+    let texture = Texture::new(16, 16, &texels).expect("texels are finite").filter(Filter::Nearest);
+    let mut nodes = Vec::new();
+    let uvs = [Vec2::new(0.1, 0.0), Vec2::new(0.9, 0.2), Vec2::new(0.3, 1.0)];
+    let root = build(&Prepared::new(texture), uvs, &mut nodes).expect("uvs are finite");
+    (nodes, root)
+}
+
+fn all_ways_have_all_the_probability<const M: usize>() {
+    let (nodes, root) = tree::<M>(&mut Pcg32::new(1, 2));
+    for smallest in [barycentric::LATTICE, barycentric::LATTICE >> 6] {
+        let (leaves, dead) = masses(&nodes, root, &Halved { smallest });
+        assert!((leaves + dead - 1.0).abs() < 1e-9 && leaves > 0.5, "{leaves} + {dead}");
+    }
+}
+
+#[test]
+fn leaves_and_dead_ends_have_all_the_probability() {
+    all_ways_have_all_the_probability::<4>();
+    all_ways_have_all_the_probability::<16>();
+    all_ways_have_all_the_probability::<64>();
+}
+
+fn a_drawn_point_leads_back<const M: usize>() {
+    let mut pcg = Pcg32::new(2, 2);
+    let (nodes, root) = tree::<M>(&mut pcg);
+    let vertices = [Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.5, 1.5), Vec3::new(0.5, 1.0, 0.75)];
+    let shape = Halved { smallest: 16 };
+    for i in 0..20_000 {
+        let edges = [0.0, 1.0 - f32::EPSILON / 2.0, 0.5, f32::MIN_POSITIVE];
+        let mut number = || if i % 7 == 0 { edges[pcg.next_u32() as usize % 4] } else { pcg.next_f32() };
+        let u = [number(), number()];
+        let salt = seed(&u);
+        let mut draw = Draw::new([Variate::new(u[0], salt), Variate::new(u[1], salt ^ 1)]);
+        let Some((cell, pmf)) = descend(&nodes, root, vertices, &shape, &mut draw) else { continue };
+        let point = draw.point(cell.domain);
+        let found = descend(&nodes, root, vertices, &shape, &mut Follow::new(point));
+        let (again, again_pmf) = found.expect("a drawn point can be drawn");
+        assert_eq!((again.domain, again_pmf), (cell.domain, pmf));
+    }
+}
+
+#[test]
+fn the_way_back_from_a_drawn_point_is_the_same() {
+    a_drawn_point_leads_back::<4>();
+    a_drawn_point_leads_back::<16>();
+    a_drawn_point_leads_back::<64>();
+}
+
+/// As many points of a grid as there are cells of a uniform tree: each cell gets one.
+#[test]
+fn stratified_input_stays_stratified() {
+    struct Uniform;
+    impl Shape for Uniform {
+        fn worth(&self, cell: &Cell) -> Worth {
+            Worth { weight: 1.0, uniform: cell.domain.size <= barycentric::LATTICE >> 6 }
+        }
+    }
+    let vertices = [Vec3::X, Vec3::Y, Vec3::Z];
+    let mut cells = alloc::collections::BTreeSet::new();
+    for i in 0..64 * 64 {
+        let u = [i % 64, i / 64].map(|x| (x as f32 + 0.5) / 64.0);
+        let mut draw = Draw::new([Variate::new(u[0], 0), Variate::new(u[1], 1)]);
+        let (cell, _) = descend::<4>(&[], Root::constant(1.0), vertices, &Uniform, &mut draw).expect("nothing is dark");
+        cells.insert((cell.domain.offset, cell.domain.inverted));
+    }
+    assert_eq!(cells.len(), 64 * 64);
+}
