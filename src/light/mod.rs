@@ -1,0 +1,7 @@
+//! Joins a triangle, its texture's tree and the environment into one target.
+
+mod illumination;
+mod triangle;
+
+pub use illumination::Illumination;
+pub(crate) use triangle::{LightTriangle, Lit, POSITION_LIMIT};

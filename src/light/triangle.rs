@@ -1,0 +1,164 @@
+//! One light triangle, and the same as it is seen from a shading point.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::illumination::{Illumination, is_below};
+use crate::blas::{Cell, Lattice, Root, Shape, Worth};
+use crate::env::{EnvironmentView, Footprint};
+use crate::geometry::{self, Triangle};
+use crate::record::{Receiver, ShadingPoint, TriangleId};
+
+/// Largest coordinate of a vertex: squares of squares of distances must not overflow where the tree is built.
+pub(crate) const POSITION_LIMIT: f32 = 1e9;
+
+/// What is kept of every triangle that can send light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(crate) struct LightTriangle {
+    /// Counter-clockwise around the front side.
+    pub(crate) vertices: [[f32; 3]; 3],
+    /// Number of the mesh, and of the triangle in it.
+    pub(crate) id: [u32; 2],
+    /// The tree over its texture.
+    pub(crate) root: Root,
+    /// [`Self::TWO_SIDED`] and [`Self::PORTAL`].
+    pub(crate) flags: u32,
+}
+
+impl LightTriangle {
+    /// Sends from its back as well.
+    pub(crate) const TWO_SIDED: u32 = 1;
+    /// Shows the environment behind it.
+    pub(crate) const PORTAL: u32 = 2;
+
+    pub(crate) fn triangle(&self) -> Triangle {
+        Triangle(self.vertices.map(Vec3::from))
+    }
+
+    pub(crate) fn id(&self) -> TriangleId {
+        TriangleId { mesh: self.id[0], triangle: self.id[1] }
+    }
+
+    pub(crate) fn is_two_sided(&self) -> bool {
+        self.flags & Self::TWO_SIDED != 0
+    }
+
+    pub(crate) fn is_portal(&self) -> bool {
+        self.flags & Self::PORTAL != 0
+    }
+
+    /// Whether the numbers, which may come from outside, are those of a triangle.
+    pub(crate) fn is_valid(&self) -> bool {
+        let in_range = self.vertices.as_flattened().iter().all(|x| x.abs() <= POSITION_LIMIT);
+        in_range && self.flags & !(Self::TWO_SIDED | Self::PORTAL) == 0 && self.root.average > 0.0
+    }
+
+    /// Whether anything can travel from the triangle to the shading point: the point is on a side that sends, and
+    /// some of the triangle is above its horizon.
+    pub(crate) fn is_visible(&self, x: &ShadingPoint) -> bool {
+        let triangle = self.triangle();
+        let height = triangle.height(x.position);
+        if !(height > 0.0 || (height < 0.0 && self.is_two_sided())) {
+            return false;
+        }
+        match x.receiver {
+            Receiver::Surface(normal) => !is_below(normal, &triangle.relative_to(x.position)),
+            Receiver::Transmissive(_) | Receiver::Volume => true,
+        }
+    }
+}
+
+/// A light triangle seen from a shading point: the target that its cells are chosen by.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lit<'a> {
+    receiver: Receiver,
+    /// Relative to the shading point.
+    pub(crate) vertices: [Vec3; 3],
+    /// Unit normal of the front side.
+    pub(crate) normal: Vec3,
+    pub(crate) area: f32,
+    /// Distance of the shading point from the triangle's plane.
+    height: f32,
+    illumination: Illumination,
+    /// What the triangle is a portal to, if that depends on the direction.
+    environment: Option<EnvironmentView<'a>>,
+}
+
+impl<'a> Lit<'a> {
+    /// The view from a shading point, or `None` where nothing can arrive.
+    pub(crate) fn new(
+        light: &LightTriangle,
+        x: &ShadingPoint,
+        illumination: Illumination,
+        environment: Option<EnvironmentView<'a>>,
+    ) -> Option<Self> {
+        if !light.is_visible(x) {
+            return None;
+        }
+        let triangle = light.triangle();
+        let (normal, area) = triangle.normal_and_area()?;
+        Some(Self {
+            receiver: x.receiver,
+            vertices: triangle.relative_to(x.position),
+            normal,
+            area,
+            height: triangle.height(x.position).abs() as f32,
+            illumination,
+            environment: environment.filter(|_| light.is_portal()),
+        })
+    }
+
+    /// A point of the triangle relative to the shading point.
+    #[inline]
+    pub(crate) fn point(&self, point: Lattice) -> Vec3 {
+        let [b1, b2] = point.to_barycentrics();
+        let [v0, v1, v2] = self.vertices;
+        v0 * ((1.0 - b1) - b2) + v1 * b1 + v2 * b2
+    }
+
+    /// Barycentrics of the point where a ray from the shading point crosses the triangle.
+    pub(crate) fn intersect(&self, direction: Vec3) -> Option<[f32; 2]> {
+        geometry::intersect(self.vertices, direction)
+    }
+
+    /// Density per solid angle of a point with this density per area, at this place relative to the shading point:
+    /// `p_A d² / cos θl`. `None` where it is not a positive number.
+    #[inline]
+    pub(crate) fn per_solid_angle(&self, pdf_area: f64, point: Vec3) -> Option<f64> {
+        let distance2 = f64::from(point.length_squared());
+        let pdf = pdf_area * distance2 * crate::math::sqrt64(distance2) / f64::from(self.height);
+        (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
+    }
+
+    /// The directions in which a cell is seen.
+    #[inline]
+    fn footprint(&self, cell: &Cell, area: f32) -> Footprint {
+        let center = cell.center();
+        let distance2 = center.length_squared().max(self.height * self.height).max(f32::MIN_POSITIVE);
+        let inverse = 1.0 / crate::math::sqrt(distance2);
+        let radius2 = cell.vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
+        Footprint {
+            direction: center * inverse,
+            sin_radius: crate::math::sqrt(radius2) * inverse,
+            solid_angle: area * self.height * inverse * inverse * inverse,
+        }
+    }
+}
+
+impl Shape for Lit<'_> {
+    #[inline]
+    fn worth(&self, cell: &Cell) -> Worth {
+        let area = self.area * cell.share();
+        let weight = self.illumination.estimate(&self.receiver, &cell.vertices, area, self.height);
+        match self.environment {
+            Some(environment) if weight > 0.0 => {
+                let footprint = self.footprint(cell, area);
+                let seen = environment.average(&footprint);
+                let one_texel = footprint.sin_radius < 1.0 && footprint.solid_angle <= environment.texel_solid_angle();
+                Worth { weight: weight * seen.value, uniform: seen.constant || one_texel }
+            }
+            _ => Worth { weight, uniform: true },
+        }
+    }
+}
