@@ -6,18 +6,24 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
-#[cfg_attr(not(test), expect(dead_code, reason = "the lights are to use it"))]
 mod blas;
+mod bounds;
 mod env;
 mod error;
 mod geometry;
+mod light;
 mod math;
 mod record;
+mod sampler;
 #[cfg(test)]
 mod testing;
+mod tlas;
 mod warp;
 
 pub use blas::Texture;
 pub use env::{Environment, EnvironmentHeader, EnvironmentSample, EnvironmentView};
 pub use error::Error;
+pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
+pub use sampler::{LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Sides, TextureId, Weight};
+pub use tlas::Splitting;

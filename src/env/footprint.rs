@@ -14,6 +14,7 @@
 use super::pyramid::level_start;
 use super::rotation::to_local;
 use super::view::EnvironmentView;
+use crate::math;
 use crate::warp::equal_area::{SPHERE, STRETCH, sphere_to_square, wrap_texel_log2};
 use glam::Vec3;
 
@@ -35,6 +36,18 @@ pub(crate) struct Footprint {
     pub(crate) sin_radius: f32,
     /// Solid angle of the region itself.
     pub(crate) solid_angle: f32,
+}
+
+impl Footprint {
+    /// The directions to a ball with this centre, relative to the viewer, and radius.
+    #[inline]
+    pub(crate) fn ball(center: Vec3, radius: f32) -> Self {
+        let inverse = 1.0 / math::sqrt(center.length_squared().max(f32::MIN_POSITIVE));
+        let sin_radius = radius * inverse;
+        let cos_radius = math::sqrt((1.0 - sin_radius * sin_radius).max(0.0));
+        let solid_angle = if sin_radius < 1.0 { 0.5 * SPHERE * (1.0 - cos_radius) } else { SPHERE };
+        Self { direction: center * inverse, sin_radius, solid_angle }
+    }
 }
 
 /// How bright a region is.

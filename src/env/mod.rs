@@ -20,7 +20,7 @@ mod view;
 
 pub use build::Environment;
 pub use descend::EnvironmentSample;
-pub(crate) use footprint::{Average, Footprint};
+pub(crate) use footprint::Footprint;
 pub use view::{EnvironmentHeader, EnvironmentView};
 
 /// Largest radiance of a texel. What is brighter is refused.

@@ -1,0 +1,227 @@
+//! From a host's meshes, textures and environment to a sampler.
+
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use glam::Vec3;
+
+use super::lights::{LightSampler, NO_LEAF};
+use super::mesh::{Kind, Mesh, Sides, TextureId, Weight};
+use crate::blas::{self, Prepared, Root, Texture};
+use crate::bounds::LightBounds;
+use crate::env::Environment;
+use crate::error::{Error, Kind as ErrorKind};
+use crate::geometry::{Aabb, Cone};
+use crate::light::{Illumination, LightTriangle, POSITION_LIMIT};
+use crate::tlas::{self, MAX_LEAVES};
+
+/// Least energy of a triangle relative to the sum of all. Below, it would vanish in single precision.
+const LEAST_ENERGY: f64 = 1e-30;
+
+/// Collects the lights of a scene and builds a [`LightSampler`].
+///
+/// Everything is checked when it is added; what was accepted can always be sampled. `N` is the arity of the tree
+/// over triangles (4, 8 or 16), `M` that of the trees over textures (4, 16 or 64).
+#[derive(Debug)]
+pub struct LightSamplerBuilder<'a, const N: usize = 8, const M: usize = 4> {
+    environment: Option<Environment>,
+    illumination: Illumination,
+    textures: Vec<Prepared<'a>>,
+    /// Triangles that may send light.
+    triangles: Vec<LightTriangle>,
+    /// For every triangle that was added, its place in `triangles` or [`NO_LEAF`].
+    places: Vec<u32>,
+    /// Where each mesh starts in `places`, and the end.
+    meshes: Vec<u32>,
+    cells: Vec<blas::Node<M>>,
+    /// Trees over textures by texture and the bits of the three uvs.
+    shared: BTreeMap<(usize, [u32; 6]), Root>,
+}
+
+impl<const N: usize, const M: usize> Default for LightSamplerBuilder<'_, N, M> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
+    /// A builder without lights, whose environment is white.
+    pub fn new() -> Self {
+        const { assert!(N == 4 || N == 8 || N == 16, "the arity of the tree over triangles is 4, 8 or 16") };
+        Self {
+            environment: None,
+            illumination: Illumination::default(),
+            textures: Vec::new(),
+            triangles: Vec::new(),
+            places: Vec::new(),
+            meshes: vec![0],
+            cells: Vec::new(),
+            shared: BTreeMap::new(),
+        }
+    }
+
+    /// Sets what the portals show.
+    pub fn environment(&mut self, environment: Environment) -> &mut Self {
+        self.environment = Some(environment);
+        self
+    }
+
+    /// Sets the term that guides the descent inside a triangle.
+    pub fn illumination(&mut self, illumination: Illumination) -> &mut Self {
+        self.illumination = illumination;
+        self
+    }
+
+    /// Adds a texture that meshes can refer to. Its texels are needed until [`Self::build`].
+    pub fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
+        self.textures.push(Prepared::new(texture));
+        TextureId(self.textures.len() - 1)
+    }
+
+    /// Adds a mesh. Returns its number: meshes are numbered in the order in which they are added. After an error the
+    /// builder is as it was before.
+    ///
+    /// # Errors
+    ///
+    /// If a vertex is not finite or has a coordinate above 1e9, an index has no vertex, the weight is NaN, negative
+    /// or above 1e30, or it is a texture of another builder or one without as many uvs as vertices.
+    pub fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<u32, Error> {
+        let number = self.meshes.len() - 1;
+        self.check(number, mesh)?;
+        let before = (self.triangles.len(), self.places.len(), self.cells.len());
+        for (triangle, indices) in (0..).zip(mesh.indices) {
+            if let Err(error) = self.add_triangle(number as u32, triangle, mesh, *indices) {
+                self.triangles.truncate(before.0);
+                self.places.truncate(before.1);
+                self.cells.truncate(before.2);
+                self.shared.retain(|_, root| root.node == blas::LEAF || (root.node as usize) < before.2);
+                return Err(error);
+            }
+        }
+        self.meshes.push(self.places.len() as u32);
+        Ok(number as u32)
+    }
+
+    /// Builds the tree over all triangles that can send light.
+    ///
+    /// # Errors
+    ///
+    /// If there are more triangles than the tree can number (2^28 - 1).
+    pub fn build(self) -> Result<LightSampler<N, M>, Error> {
+        let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
+        let (lights, bounds) = select(&self.triangles, &environment);
+        if lights.len() > MAX_LEAVES {
+            return Err(Error(ErrorKind::TooMany { what: "light triangles", count: lights.len(), limit: MAX_LEAVES }));
+        }
+        let (tlas, order) = tlas::build::<N>(&bounds);
+        let mut leaf_of = vec![NO_LEAF; self.triangles.len()];
+        for (leaf, &light) in (0..).zip(&order) {
+            leaf_of[lights[light as usize] as usize] = leaf;
+        }
+        let leaf_at = |&place: &u32| if place == NO_LEAF { NO_LEAF } else { leaf_of[place as usize] };
+        Ok(LightSampler {
+            tlas,
+            triangles: order.iter().map(|&light| self.triangles[lights[light as usize] as usize]).collect(),
+            leaves: self.places.iter().map(leaf_at).collect(),
+            meshes: self.meshes,
+            cells: self.cells,
+            environment,
+            illumination: self.illumination,
+        })
+    }
+
+    fn check(&self, number: usize, mesh: &Mesh<'_>) -> Result<(), Error> {
+        let fail = |kind| Err(Error(kind));
+        let vertices = mesh.positions.len();
+        let count = self.places.len().saturating_add(mesh.indices.len());
+        if count > MAX_LEAVES {
+            return fail(ErrorKind::TooMany { what: "triangles", count, limit: MAX_LEAVES });
+        }
+        let in_range = |p: &Vec3| p.to_array().iter().all(|x| x.abs() <= POSITION_LIMIT);
+        if let Some(vertex) = mesh.positions.iter().position(|p| !in_range(p)) {
+            let value = mesh.positions[vertex].to_array();
+            return fail(ErrorKind::Position { mesh: number, vertex, value, limit: POSITION_LIMIT });
+        }
+        for (triangle, indices) in mesh.indices.iter().enumerate() {
+            if let Some(&index) = indices.iter().find(|index| **index as usize >= vertices) {
+                return fail(ErrorKind::Index { mesh: number, triangle, index, vertices });
+            }
+        }
+        match mesh.weight {
+            Weight::Constant(value) if !(0.0..=blas::MAX_AVERAGE).contains(&value) => {
+                fail(ErrorKind::Weight { mesh: number, value, limit: blas::MAX_AVERAGE })
+            }
+            Weight::Constant(_) => Ok(()),
+            Weight::Texture(TextureId(texture)) if texture >= self.textures.len() => {
+                fail(ErrorKind::UnknownTexture { mesh: number, texture, textures: self.textures.len() })
+            }
+            Weight::Texture(_) if mesh.uvs.len() != vertices => {
+                fail(ErrorKind::TextureCoordinateCount { mesh: number, found: mesh.uvs.len(), vertices })
+            }
+            Weight::Texture(_) => {
+                mesh.uvs.iter().enumerate().try_for_each(|(vertex, uv)| blas::check_uv(number, vertex, *uv))
+            }
+        }
+    }
+
+    fn add_triangle(&mut self, mesh_number: u32, number: u32, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<(), Error> {
+        let root = self.root(mesh, indices)?;
+        let two_sided = if mesh.sides == Sides::Two { LightTriangle::TWO_SIDED } else { 0 };
+        let portal = if mesh.kind == Kind::Portal { LightTriangle::PORTAL } else { 0 };
+        let triangle = LightTriangle {
+            vertices: indices.map(|index| mesh.positions[index as usize].to_array()),
+            id: [mesh_number, number],
+            root,
+            flags: two_sided | portal,
+        };
+        let sends = root.average > 0.0 && triangle.triangle().normal_and_area().is_some();
+        self.places.push(if sends { self.triangles.len() as u32 } else { NO_LEAF });
+        self.triangles.extend(sends.then_some(triangle));
+        Ok(())
+    }
+
+    /// The tree over the texture of one triangle, built only if no triangle before has the same.
+    fn root(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<Root, Error> {
+        let texture = match mesh.weight {
+            Weight::Constant(weight) => return Ok(Root::constant(blas::storable(f64::from(weight)))),
+            Weight::Texture(TextureId(texture)) => texture,
+        };
+        let uvs = indices.map(|index| mesh.uvs[index as usize]);
+        let [a, b, c] = uvs.map(|uv| uv.to_array().map(f32::to_bits));
+        let key = (texture, [a[0], a[1], b[0], b[1], c[0], c[1]]);
+        if let Some(&root) = self.shared.get(&key) {
+            return Ok(root);
+        }
+        let root = blas::build(&self.textures[texture], uvs, &mut self.cells)?;
+        self.shared.insert(key, root);
+        Ok(root)
+    }
+}
+
+/// Which triangles send anything in this environment, and the bounds of each.
+fn select(triangles: &[LightTriangle], environment: &Environment) -> (Vec<u32>, Vec<LightBounds>) {
+    let mean = f64::from(environment.mean());
+    let energy = |light: &LightTriangle| {
+        let radiance = if light.is_portal() { mean } else { 1.0 };
+        let area = light.triangle().normal_and_area().map_or(0.0, |(_, area)| f64::from(area));
+        f64::from(light.root.average) * area * radiance
+    };
+    let total: f64 = triangles.iter().map(energy).sum();
+    let lights: Vec<u32> = (0..).zip(triangles).filter(|(_, light)| energy(light) > 0.0).map(|(i, _)| i).collect();
+    let bounds = |&light: &u32| {
+        let light = &triangles[light as usize];
+        let share = (energy(light) / total).max(LEAST_ENERGY) as f32;
+        let directional = light.is_portal() && !environment.is_constant();
+        let triangle = light.triangle();
+        LightBounds {
+            aabb: Aabb::around(&triangle.0),
+            normals: Cone::single(triangle.normal_and_area().map_or(Vec3::Z, |(normal, _)| normal)),
+            flux: if directional { 0.0 } else { share },
+            portal: if directional { share } else { 0.0 },
+            two_sided: light.is_two_sided(),
+        }
+    };
+    let bounds = lights.iter().map(bounds).collect();
+    (lights, bounds)
+}

@@ -1,0 +1,154 @@
+//! All lights of a scene, owned or borrowed.
+
+use alloc::vec::Vec;
+
+use glam::Vec3;
+
+use super::builder::LightSamplerBuilder;
+use crate::blas;
+use crate::env::{Environment, EnvironmentView, Footprint};
+use crate::light::{Illumination, LightTriangle, Lit};
+use crate::record::{ShadingPoint, TriangleId};
+use crate::tlas::{self, Tlas, TlasView};
+
+/// Marks a triangle that is not in the tree because it sends nothing.
+pub(super) const NO_LEAF: u32 = u32::MAX;
+
+/// All lights of a scene, ready to be sampled. `N` is the arity of the tree over triangles (4, 8 or 16), `M` that of
+/// the trees over textures (4, 16 or 64).
+///
+/// All that a shading point needs works on [`LightSamplerView`], which borrows plain data; the methods here forward
+/// to it.
+#[derive(Clone, Debug)]
+pub struct LightSampler<const N: usize = 8, const M: usize = 4> {
+    pub(super) tlas: Tlas<N>,
+    /// In the order of the tree's leaves.
+    pub(super) triangles: Vec<LightTriangle>,
+    pub(super) cells: Vec<blas::Node<M>>,
+    /// Where the triangles of each mesh start in `leaves`, and their number at the end.
+    pub(super) meshes: Vec<u32>,
+    /// Leaf of every triangle that was added, or [`NO_LEAF`].
+    pub(super) leaves: Vec<u32>,
+    pub(super) environment: Environment,
+    pub(super) illumination: Illumination,
+}
+
+/// All lights of a scene in borrowed memory: plain data that can be mapped from a file or shared between processes.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSamplerView<'a, const N: usize = 8, const M: usize = 4> {
+    pub(super) tlas: TlasView<'a, N>,
+    pub(super) triangles: &'a [LightTriangle],
+    pub(super) cells: &'a [blas::Node<M>],
+    pub(super) meshes: &'a [u32],
+    pub(super) leaves: &'a [u32],
+    pub(super) environment: EnvironmentView<'a>,
+    pub(super) illumination: Illumination,
+}
+
+impl LightSampler {
+    /// Starts a sampler of the default arities.
+    pub fn builder<'a>() -> LightSamplerBuilder<'a> {
+        LightSamplerBuilder::new()
+    }
+}
+
+impl<const N: usize, const M: usize> LightSampler<N, M> {
+    /// The same lights in borrowed form.
+    #[inline]
+    pub fn as_view(&self) -> LightSamplerView<'_, N, M> {
+        LightSamplerView {
+            tlas: self.tlas.view(),
+            triangles: &self.triangles,
+            cells: &self.cells,
+            meshes: &self.meshes,
+            leaves: &self.leaves,
+            environment: self.environment.as_view(),
+            illumination: self.illumination,
+        }
+    }
+
+    /// The environment, for its own sampling.
+    pub fn environment(&self) -> &Environment {
+        &self.environment
+    }
+
+    /// Turns the environment; nothing is built anew.
+    ///
+    /// # Errors
+    ///
+    /// As [`Environment::set_rotation`].
+    pub fn set_environment_rotation(&mut self, rotation: glam::Mat3) -> Result<(), crate::Error> {
+        self.environment.set_rotation(rotation)
+    }
+}
+
+impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+    /// The environment, for its own sampling.
+    pub fn environment(&self) -> EnvironmentView<'a> {
+        self.environment
+    }
+
+    /// Number of triangles that can send light.
+    pub fn light_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Number of bytes that the structures take, by part: tree over triangles, triangles, trees over textures,
+    /// environment.
+    pub fn bytes(&self) -> [usize; 4] {
+        let tlas = size_of_val(self.tlas.nodes)
+            + size_of_val(self.tlas.parents)
+            + size_of_val(self.tlas.spreads)
+            + size_of_val(self.tlas.leaves);
+        let triangles = size_of_val(self.triangles) + size_of_val(self.meshes) + size_of_val(self.leaves);
+        let environment = size_of_val(self.environment.means())
+            + size_of_val(self.environment.ranges())
+            + size_of_val(self.environment.filtered_means());
+        [tlas, triangles, size_of_val(self.cells), environment]
+    }
+
+    /// Leaf of a triangle; `None` for one that sends nothing or that was never added.
+    pub(super) fn leaf(&self, id: TriangleId) -> Option<u32> {
+        let start = *self.meshes.get(id.mesh as usize)?;
+        let end = *self.meshes.get(id.mesh as usize + 1)?;
+        let index = start.checked_add(id.triangle).filter(|index| *index < end)?;
+        self.leaves.get(index as usize).copied().filter(|leaf| *leaf != NO_LEAF)
+    }
+
+    /// A triangle as seen from a shading point; `None` if nothing can arrive from it.
+    pub(super) fn lit(&self, leaf: u32, x: &ShadingPoint) -> Option<Lit<'a>> {
+        Lit::new(&self.triangles[leaf as usize], x, self.illumination, self.directional_environment())
+    }
+
+    /// The environment, if what it shows depends on the direction.
+    fn directional_environment(&self) -> Option<EnvironmentView<'a>> {
+        (!self.environment.is_constant()).then_some(self.environment)
+    }
+
+    /// What the tree over triangles asks for at a shading point.
+    pub(super) fn scene<'s>(&'s self, x: &'s ShadingPoint) -> Scene<'s> {
+        Scene { x, triangles: self.triangles, environment: self.environment }
+    }
+}
+
+/// The tree's window on triangles and environment.
+pub(super) struct Scene<'a> {
+    x: &'a ShadingPoint,
+    triangles: &'a [LightTriangle],
+    environment: EnvironmentView<'a>,
+}
+
+impl tlas::Scene for Scene<'_> {
+    fn radiance(&self, center: Vec3, radius: f32) -> f32 {
+        let mean = self.environment.mean();
+        if mean <= 0.0 {
+            return 0.0;
+        }
+        self.environment.average(&Footprint::ball(center, radius)).value / mean
+    }
+
+    #[inline]
+    fn is_visible(&self, leaf: u32) -> bool {
+        self.triangles[leaf as usize].is_visible(self.x)
+    }
+}

@@ -1,0 +1,82 @@
+//! How a host describes its lights.
+
+use glam::{Vec2, Vec3};
+
+/// A texture that was handed to a builder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TextureId(pub(super) usize);
+
+/// The sides of a triangle that light leaves from. A triangle's vertices run counter-clockwise around its front.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Sides {
+    /// The front alone. The front of a portal faces the room.
+    #[default]
+    One,
+    /// Both.
+    Two,
+}
+
+/// What a triangle's density is guided by: luminance of the emission of a mesh light, transmittance of a portal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Weight {
+    /// The same everywhere; finite, not negative.
+    Constant(f32),
+    /// A texture, seen through the mesh's texture coordinates.
+    Texture(TextureId),
+}
+
+/// What a mesh does with light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Emitter,
+    Portal,
+}
+
+/// A triangle mesh that sends light, borrowed from the host.
+#[derive(Clone, Copy, Debug)]
+pub struct Mesh<'a> {
+    pub(super) kind: Kind,
+    pub(super) positions: &'a [Vec3],
+    pub(super) indices: &'a [[u32; 3]],
+    pub(super) uvs: &'a [Vec2],
+    pub(super) weight: Weight,
+    pub(super) sides: Sides,
+}
+
+impl<'a> Mesh<'a> {
+    /// A mesh that emits light; its weight is the luminance of the radiance, 1 until [`Self::weight`] says otherwise.
+    pub const fn emitter(positions: &'a [Vec3], indices: &'a [[u32; 3]]) -> Self {
+        Self::new(Kind::Emitter, positions, indices)
+    }
+
+    /// A mesh that fills an opening to the environment; its weight is the transmittance, 1 until [`Self::weight`]
+    /// says otherwise.
+    pub const fn portal(positions: &'a [Vec3], indices: &'a [[u32; 3]]) -> Self {
+        Self::new(Kind::Portal, positions, indices)
+    }
+
+    const fn new(kind: Kind, positions: &'a [Vec3], indices: &'a [[u32; 3]]) -> Self {
+        Self { kind, positions, indices, uvs: &[], weight: Weight::Constant(1.0), sides: Sides::One }
+    }
+
+    /// Sets what guides the density.
+    #[must_use]
+    pub const fn weight(mut self, weight: Weight) -> Self {
+        self.weight = weight;
+        self
+    }
+
+    /// Sets the texture coordinates, one a vertex. Needed for a textured weight only.
+    #[must_use]
+    pub const fn uvs(mut self, uvs: &'a [Vec2]) -> Self {
+        self.uvs = uvs;
+        self
+    }
+
+    /// Sets the sides that light leaves from.
+    #[must_use]
+    pub const fn sides(mut self, sides: Sides) -> Self {
+        self.sides = sides;
+        self
+    }
+}

@@ -1,0 +1,14 @@
+//! The facade that a host calls.
+
+mod builder;
+mod bytes;
+mod direction;
+mod lights;
+mod mesh;
+mod pdf;
+mod sample;
+mod split;
+
+pub use builder::LightSamplerBuilder;
+pub use lights::{LightSampler, LightSamplerView};
+pub use mesh::{Mesh, Sides, TextureId, Weight};
