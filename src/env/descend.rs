@@ -43,7 +43,7 @@ impl EnvironmentView<'_> {
         for depth in 0..self.header.depth {
             let [a, b, c, d] = children(self.means, depth, x, y);
             let j = pick_pair([a + b, c + d], &mut row);
-            let columns = if j == 0 { [a, b] } else { [c, d] };
+            let columns = [[a, b], [c, d]][j];
             let i = pick_pair(columns, &mut column);
             (x, y) = (2 * x + i as u32, 2 * y + j as u32);
         }

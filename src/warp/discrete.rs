@@ -38,7 +38,10 @@ pub(crate) fn pick_pair([first, second]: [f32; 2], variate: &mut Variate) -> usi
     let total = first + second;
     let target = variate.value() * total;
     let upper = target >= first && second > 0.0;
-    let (low, width) = if upper { (first, second) } else { (0.0, first) };
+    // A branch here would be a coin toss for the predictor, and compilers turn a choice between floats into one.
+    // Products with 0 and 1 are exact.
+    let one = f64::from(u8::from(upper));
+    let (low, width) = (first * one, second * one + first * (1.0 - one));
     variate.stretch(target - low, width, total);
     usize::from(upper)
 }
