@@ -3,8 +3,9 @@
 use super::pyramid::children;
 use super::rotation::to_world;
 use super::view::EnvironmentView;
+use crate::warp::discrete::pick_pair;
 use crate::warp::equal_area::{SPHERE, square_to_sphere};
-use crate::warp::{Variate, pick_pair, seed};
+use crate::warp::variate::{Variate, seed};
 use glam::{Vec2, Vec3};
 
 /// How close to its texel's edge a sample may come, in units of the square.

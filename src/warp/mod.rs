@@ -3,6 +3,3 @@
 pub(crate) mod discrete;
 pub(crate) mod equal_area;
 pub(crate) mod variate;
-
-pub(crate) use discrete::{pick, pick_pair, sum};
-pub(crate) use variate::{Variate, seed};
