@@ -12,13 +12,8 @@ pub struct Error(pub(crate) Kind);
 impl Error {
     /// Bytes that hold, in the element `at` or at that offset, something else than they should.
     pub(crate) fn bytes(what: &'static str, at: usize, found: impl TryInto<u64>, expected: impl TryInto<u64>) -> Self {
-        let number = |n: Result<u64, _>| n.unwrap_or(u64::MAX);
-        Self(Kind::Bytes {
-            what,
-            at,
-            found: number(found.try_into().map_err(drop)),
-            expected: number(expected.try_into().map_err(drop)),
-        })
+        let (found, expected) = (found.try_into().unwrap_or(u64::MAX), expected.try_into().unwrap_or(u64::MAX));
+        Self(Kind::Bytes { what, at, found, expected })
     }
 
     /// `Ok` if a count that bytes hold is the expected one.

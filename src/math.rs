@@ -76,3 +76,15 @@ pub(crate) fn floor64(x: f64) -> f64 {
     #[cfg(not(feature = "std"))]
     return libm::floor(x);
 }
+
+/// `x` limited to `[0, high]`; NaN becomes 0, unlike with `clamp`.
+#[inline(always)]
+pub(crate) fn limit(x: f32, high: f32) -> f32 {
+    if x > 0.0 { x.min(high) } else { 0.0 }
+}
+
+/// `x` limited to `[0, high]`, in double precision; NaN becomes 0, unlike with `clamp`.
+#[inline(always)]
+pub(crate) fn limit64(x: f64, high: f64) -> f64 {
+    if x > 0.0 { x.min(high) } else { 0.0 }
+}

@@ -169,7 +169,7 @@ impl Cell {
     }
 
     /// The corners as exact `[b1, b2]`.
-    #[inline]
+    #[cfg(test)]
     pub(crate) fn corner_barycentrics(self) -> [[f32; 2]; 3] {
         self.corners().map(Lattice::to_barycentrics)
     }

@@ -8,6 +8,7 @@ use super::view::{EnvironmentHeader, EnvironmentView};
 use super::{BRIGHTEST, DARKEST, MAX_DEPTH, rotation};
 use crate::error::{Error, Kind};
 use crate::record::Filter;
+use alloc::vec;
 use glam::{Mat3, Vec3};
 
 /// A non-negative radiance over all directions, seen from the scene.
@@ -42,7 +43,7 @@ impl Environment {
             let expected = "finite, not negative and at most 1e30";
             return Err(Error(Kind::Scalar { what: "environment: the radiance", value: radiance, expected }));
         }
-        Ok(Self::from_image(0, &[if radiance > 0.0 { radiance.max(DARKEST) } else { 0.0 }], 0))
+        Ok(Self::uniform(if radiance > 0.0 { radiance.max(DARKEST) } else { 0.0 }, 0))
     }
 
     /// From the luminance of a latitude-longitude image, `width * height` texels, the top row first.
@@ -112,19 +113,19 @@ impl Environment {
 
     fn from_source(source: &Source, edges: Edges, depth: u32) -> Self {
         if let Some(radiance) = source.constant() {
-            return Self::from_image(0, &[radiance], source.clamped);
+            return Self::uniform(radiance, source.clamped);
         }
         // One texel is cut by all seams of the map; take the mean of four instead.
-        let pyramid = Pyramid::new(depth.max(1), &resample(source, edges, depth.max(1)));
+        let pyramid = Pyramid::new(depth.max(1), resample(source, edges, depth.max(1)));
         let [low, high] = pyramid.ranges[0];
         if depth == 0 || low == high {
-            return Self::from_image(0, &pyramid.means[..1], source.clamped);
+            return Self::uniform(pyramid.means[0], source.clamped);
         }
         Self::from_pyramid(depth, pyramid, source.clamped)
     }
 
-    fn from_image(depth: u32, image: &[f32], clamped_texels: u32) -> Self {
-        Self::from_pyramid(depth, Pyramid::new(depth, image), clamped_texels)
+    fn uniform(radiance: f32, clamped_texels: u32) -> Self {
+        Self::from_pyramid(0, Pyramid::new(0, vec![radiance]), clamped_texels)
     }
 
     fn from_pyramid(depth: u32, pyramid: Pyramid, clamped_texels: u32) -> Self {

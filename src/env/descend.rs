@@ -3,8 +3,9 @@
 use super::pyramid::children;
 use super::rotation::to_world;
 use super::view::EnvironmentView;
+use crate::warp::discrete::pick_pair;
 use crate::warp::equal_area::{SPHERE, square_to_sphere};
-use crate::warp::{Variate, pick_pair, seed};
+use crate::warp::variate::{Variate, seed};
 use glam::{Vec2, Vec3};
 
 /// How close to its texel's edge a sample may come, in units of the square.
@@ -43,7 +44,7 @@ impl EnvironmentView<'_> {
         for depth in 0..self.header.depth {
             let [a, b, c, d] = children(self.means, depth, x, y);
             let j = pick_pair([a + b, c + d], &mut row);
-            let columns = if j == 0 { [a, b] } else { [c, d] };
+            let columns = [[a, b], [c, d]][j];
             let i = pick_pair(columns, &mut column);
             (x, y) = (2 * x + i as u32, 2 * y + j as u32);
         }

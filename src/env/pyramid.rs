@@ -25,12 +25,10 @@ pub(super) struct Pyramid {
 }
 
 impl Pyramid {
-    /// Builds all levels of an image of `2^depth` texels a side. Its texels are 0 or in `[1e-30, 1e30]`.
-    pub(super) fn new(depth: u32, image: &[f32]) -> Self {
-        let inner = level_start(depth);
-        let mut means = vec![0.0; inner];
-        means.extend_from_slice(image);
-        let mut ranges = vec![[0.0; 2]; inner];
+    /// Builds all levels of an image of `2^depth` texels a side. Its texels are 0 or in `[1e-30, 1e30]`, and
+    /// stand at the end of `means`, which has room for all levels.
+    pub(super) fn new(depth: u32, mut means: Vec<f32>) -> Self {
+        let mut ranges = vec![[0.0; 2]; level_start(depth)];
         for d in (0..depth).rev() {
             let size = 1_u32 << d;
             for y in 0..size {

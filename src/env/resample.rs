@@ -1,23 +1,28 @@
 //! From a host's image to an equal-area image whose size is a power of two, by area: no flux is lost.
 
 use super::lat_long::LatLong;
+use super::pyramid::level_start;
 use super::source::{Edges, Source};
 use super::{BRIGHTEST, DARKEST};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Means of the source over the texels of an equal-area image of `2^depth` texels a side, `depth` at least 1.
+/// Means of the source over the texels of an equal-area image of `2^depth` texels a side, `depth` at least 1, as
+/// the finest level of an otherwise empty pyramid.
 ///
 /// A texel that shares any area with a lit cell is lit.
 pub(super) fn resample(source: &Source, edges: Edges, depth: u32) -> Vec<f32> {
+    let mut levels = vec![0.0; level_start(depth + 1)];
+    let image = &mut levels[level_start(depth)..];
     let size = 1_usize << depth;
     match edges {
         Edges::LatLong => {
             let source = LatLong::new(source);
-            fill(size, |x, y| source.texel(x, y, size))
+            fill(image, size, |x, y| source.texel(x, y, size));
         }
-        Edges::EqualArea => fill(size, |x, y| box_mean(source, x, y, size)),
+        Edges::EqualArea => fill(image, size, |x, y| box_mean(source, x, y, size)),
     }
+    levels
 }
 
 /// Mean over the cells of an equal-area source that a texel overlaps.
@@ -44,8 +49,7 @@ fn overlaps(texel: usize, size: usize, cells: usize) -> impl Iterator<Item = (us
 
 /// Computes all texels, in parallel with the feature `rayon`. Each one is computed alone: the result does not
 /// depend on the number of threads.
-fn fill(size: usize, texel: impl Fn(usize, usize) -> f64 + Sync) -> Vec<f32> {
-    let mut image = vec![0.0; size * size];
+fn fill(image: &mut [f32], size: usize, texel: impl Fn(usize, usize) -> f64 + Sync) {
     let fill_row = |(y, row): (usize, &mut [f32])| {
         for (x, out) in row.iter_mut().enumerate() {
             let mean = texel(x, y);
@@ -59,5 +63,4 @@ fn fill(size: usize, texel: impl Fn(usize, usize) -> f64 + Sync) -> Vec<f32> {
     }
     #[cfg(not(feature = "rayon"))]
     image.chunks_mut(size).enumerate().for_each(fill_row);
-    image
 }

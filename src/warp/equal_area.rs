@@ -8,7 +8,7 @@
 //! Only additions, multiplications, divisions and square roots are used, so that the results do not depend on
 //! the library that the float functions come from.
 
-use crate::math::sqrt;
+use crate::math::{limit, sqrt};
 use core::f32::consts::{FRAC_1_SQRT_2, TAU};
 use glam::{Vec2, Vec3};
 
@@ -17,8 +17,7 @@ use glam::{Vec2, Vec3};
 /// Within 2.5e-7 of the exact map, and within 2.5e-7 of unit length.
 #[inline]
 pub(crate) fn square_to_sphere(point: Vec2) -> Vec3 {
-    // `max` first: it turns NaN into 0.
-    let (x, y) = (point.x.max(0.0).min(1.0), point.y.max(0.0).min(1.0));
+    let (x, y) = (limit(point.x, 1.0), limit(point.y, 1.0));
     // Distances from the centre lines and from the nearest edges, in units of half the side. None of them
     // cancels: 2x - 1 rounds at most once, 1 - x is exact where x > 1/2.
     let (u, v) = ((2.0 * x - 1.0).abs(), (2.0 * y - 1.0).abs());
@@ -54,7 +53,7 @@ pub(crate) fn sphere_to_square(direction: Vec3) -> Vec2 {
     let (a, b) = if y > x { (minor, major) } else { (major, minor) };
     // Distances from the centre lines; the lower hemisphere is mirrored at the diamond.
     let (u, v) = if direction.z < 0.0 { (1.0 - b, 1.0 - a) } else { (a, b) };
-    let place = |distance: f32, side: f32| (0.5 + 0.5 * distance.copysign(side)).max(0.0).min(1.0);
+    let place = |distance: f32, side: f32| limit(0.5 + 0.5 * distance.copysign(side), 1.0);
     Vec2::new(place(u, direction.x), place(v, direction.y))
 }
 

@@ -1,5 +1,7 @@
 //! Uniform variates that survive any number of discrete choices.
 
+use crate::math::{limit, limit64};
+
 /// Below this share of the unit interval, a [`Variate`] gets fresh low bits.
 ///
 /// 2^-20 leaves 2^32 of the 2^52 steps of a double at the time of the refill: choices between two refills see
@@ -27,7 +29,7 @@ pub(crate) struct Variate {
     value: f64,
     /// Share of the unit interval that `value` was stretched from since its low bits were last filled, in `(0, 1]`.
     spent: f64,
-    /// State of the SplitMix64 generator of low bits.
+    /// State of the `SplitMix64` generator of low bits.
     state: u64,
 }
 
@@ -38,8 +40,7 @@ impl Variate {
     /// for example the [`seed`] of all its numbers plus a count.
     #[inline]
     pub(crate) fn new(u: f32, salt: u64) -> Self {
-        // `max` first: it turns NaN into 0.
-        let u = u.max(0.0).min(ALMOST_ONE_F32);
+        let u = limit(u, ALMOST_ONE_F32);
         let mut variate = Self { value: 0.0, spent: 1.0, state: salt };
         let low = variate.fresh() * (1.0 / 16_777_216.0);
         variate.value = (f64::from(u) + low).min(ALMOST_ONE);
@@ -69,23 +70,24 @@ impl Variate {
         (self.value as f32).min(ALMOST_ONE_F32)
     }
 
-    /// Stretches `[low, low + width)`, the interval that was chosen because the value lies in it, to `[0, 1)`.
-    ///
-    /// A value outside of it through rounding is clamped. `width` must be above zero.
-    #[inline]
+    /// [`stretch`](Self::stretch) of `[low, low + width)` out of the unit interval.
+    #[cfg(test)]
     pub(crate) fn rescale(&mut self, low: f64, width: f64) {
         self.stretch(self.value - low, width, 1.0);
     }
 
-    /// [`rescale`](Self::rescale) in other units: the value is `offset` above the low end of an interval of size
-    /// `width`, out of `total` that stand for the whole unit interval.
+    /// Stretches an interval that was chosen because the value lies in it to `[0, 1)`.
+    ///
+    /// The value is `offset` above the low end of the interval, which has the size `width` out of `total` that stand
+    /// for the whole unit interval. A value outside of it through rounding is clamped. `width` must be above zero.
     #[inline]
     pub(crate) fn stretch(&mut self, offset: f64, width: f64, total: f64) {
-        // `max` first: it also swallows the NaN of 0 / 0.
-        self.value = (offset / width).max(0.0).min(ALMOST_ONE);
+        // Also swallows the NaN of 0 / 0.
+        self.value = limit64(offset / width, ALMOST_ONE);
         self.spent *= width / total;
-        // Negated, so that a NaN `spent` is mended too.
-        if !(self.spent >= REFILL_BELOW) {
+        // Asked this way round, a NaN is mended too.
+        let enough = self.spent >= REFILL_BELOW;
+        if !enough {
             self.refill();
         }
     }
@@ -100,7 +102,7 @@ impl Variate {
         self.spent = 1.0;
     }
 
-    /// Uniform in `[0, 1)`, a multiple of 2^-53 (SplitMix64, Steele et al. 2014).
+    /// Uniform in `[0, 1)`, a multiple of 2^-53 (`SplitMix64`, Steele et al. 2014).
     #[inline]
     fn fresh(&mut self) -> f64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -108,7 +110,7 @@ impl Variate {
     }
 }
 
-/// Finaliser of SplitMix64: every input bit changes every output bit with probability one half.
+/// Finaliser of `SplitMix64`: every input bit changes every output bit with probability one half.
 #[inline]
 const fn mix(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

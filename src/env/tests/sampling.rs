@@ -196,3 +196,18 @@ fn any_number_and_any_vector_is_safe() {
         }
     }
 }
+
+#[test]
+fn samples_are_the_same_bits_everywhere() {
+    let mut pcg = Pcg32::new(40, 1);
+    let image: Vec<f32> = (0..1024).map(|_| pcg.next_f32()).collect();
+    let environment = Environment::from_equal_area(32, &image, Filter::Bilinear).unwrap();
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for _ in 0..10_000 {
+        let sample = environment.sample([pcg.next_f32(), pcg.next_f32()]).unwrap();
+        for x in sample.direction.to_array().into_iter().chain([sample.radiance, sample.pdf]) {
+            hash = (hash ^ u64::from(x.to_bits())).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+    assert_eq!(hash, 10_881_672_811_916_898_430);
+}

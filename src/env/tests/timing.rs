@@ -14,6 +14,20 @@ fn timing() {
         black_box(Environment::from_lat_long(1024, 512, &image, filter).unwrap());
         std::println!("build of 1024 x 512, {filter:?}: {:.3} s", start.elapsed().as_secs_f64());
     }
+    for size in [2, 16, 128, 1024] {
+        let mut image = noise(size * size, 3);
+        image.iter_mut().for_each(|v| *v = 1.0 + *v * 1e-6);
+        let environment = Environment::from_equal_area(size, &image, Filter::Nearest).unwrap();
+        let mut pcg = Pcg32::new(1, 1);
+        let u: Vec<[f32; 2]> = (0..65536).map(|_| [pcg.next_f32(), pcg.next_f32()]).collect();
+        let mut best = f64::INFINITY;
+        for _ in 0..19 {
+            let start = Instant::now();
+            u.iter().for_each(|&u| drop(black_box(environment.sample(u))));
+            best = best.min(start.elapsed().as_nanos() as f64 / 65536.0);
+        }
+        std::println!("nearly uniform, {size} x {size}: sample {best:.1} ns");
+    }
     let smooth: Vec<f32> = (0..1024 * 512).map(|i| 1.0 + ((i % 1024) as f32 * 0.02).sin()).collect();
     for (name, image) in [("noise", &image), ("smooth", &smooth)] {
         let environment = Environment::from_lat_long(1024, 512, image, Filter::Bilinear).unwrap();
