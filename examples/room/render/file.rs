@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::Error;
 use super::film::Image;
 
-/// Reads an OpenEXR file (any compression, alpha ignored) or whatever else the `image` crate was built for.
+/// Reads an `OpenEXR` file (any compression, alpha ignored) or whatever else the `image` crate was built for.
 pub(crate) fn read_rgb(path: &Path) -> Result<Image, Error> {
     let is_exr = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
     let image = if is_exr { read_exr(path) } else { read_other(path) };
@@ -31,7 +31,7 @@ fn read_other(path: &Path) -> Result<Image, Error> {
     Ok(Image { width: image.width() as usize, height: image.height() as usize, pixels })
 }
 
-/// Writes an OpenEXR file.
+/// Writes an `OpenEXR` file.
 pub(crate) fn write_rgb(path: &Path, image: &Image) -> Result<(), Error> {
     let pixel = |x: usize, y: usize| image.pixels[y * image.width + x].into();
     exr::prelude::write_rgb_file(path, image.width, image.height, pixel)

@@ -55,7 +55,7 @@ impl PathTracer<'_> {
         for _ in 0..self.bounces {
             radiance += throughput * self.light_by_light_samples(&x, random);
             let direction = sample_cosine(x.normal, random.take());
-            let Some(next) = self.scene.trace_from(&x, direction) else {
+            let Some(next) = self.scene.trace(x.position, direction) else {
                 return radiance + throughput * self.reflected(&x, direction, self.density(&x, direction));
             };
             throughput *= ALBEDO;
@@ -79,7 +79,9 @@ impl PathTracer<'_> {
     /// Direct light along a proposed direction, whose density under the other light sampler is `other_pdf`.
     fn light_along(&self, x: &SurfacePoint, proposal: Option<Proposal>, other_pdf: impl Fn(Vec3) -> f32) -> Vec3 {
         match proposal {
-            Some(Proposal { direction, pdf }) if x.normal.dot(direction) > 0.0 && self.scene.sees_sky(x, direction) => {
+            Some(Proposal { direction, pdf })
+                if x.normal.dot(direction) > 0.0 && self.scene.sees_sky(x.position, direction) =>
+            {
                 self.reflected(x, direction, cosine_pdf(x.normal, direction) + pdf + other_pdf(direction))
             }
             _ => Vec3::ZERO,

@@ -83,7 +83,7 @@ impl Progressive<'_> {
     }
 }
 
-/// The finalizer of SplitMix64: neighbouring numbers become unrelated ones.
+/// The finalizer of `SplitMix64`: neighbouring numbers become unrelated ones.
 fn mix(mut bits: u64) -> u64 {
     bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);

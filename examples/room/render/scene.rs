@@ -11,22 +11,17 @@ use obvhs::triangle::Triangle;
 use super::mask::Mask;
 use super::room::{Room, TriangleMesh};
 
-/// How far from a surface a ray starts, so that it does not meet it again.
+/// How far from the walls a ray starts, so that it does not meet the same wall again.
 const OFFSET: f32 = 1e-4;
 
 /// A point on a wall.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfacePoint {
+    /// A hair's breadth in front of the wall, and of any wall that it meets in a corner: rounding puts some points
+    /// near a corner on its wrong side, where a single one in the sun outshines the corner.
     pub(crate) position: Vec3,
     /// Unit normal to the side that the ray came from.
     pub(crate) normal: Vec3,
-}
-
-impl SurfacePoint {
-    /// Start of a ray that leaves this point.
-    fn ray_origin(&self) -> Vec3 {
-        self.position + OFFSET * self.normal
-    }
 }
 
 /// The room, ready for ray casting.
@@ -36,16 +31,23 @@ pub(crate) struct Scene {
     uvs: Vec<[Vec2; 3]>,
     masked: Range<usize>,
     mask: Option<Mask>,
+    /// The corners of what lies between the walls.
+    inside: (Vec3, Vec3),
 }
 
 impl Scene {
-    /// Takes the walls over, and hands back the portal in the window with a copy of its mask.
+    /// Takes the walls over.
     pub(crate) fn new(room: Room) -> Self {
         let triangles = triangles(&room.walls);
         let uvs = room.walls.indices.iter().map(|corners| corners.map(|i| room.walls.uvs[i as usize])).collect();
         let mut build_time = core::time::Duration::ZERO;
         let bvh = build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), &mut build_time);
-        Self { bvh, triangles, uvs, masked: room.masked, mask: room.mask }
+        let corners = room.walls.positions.iter();
+        let inside = (
+            corners.clone().fold(Vec3::INFINITY, |low, &corner| low.min(corner)) + OFFSET,
+            corners.fold(Vec3::NEG_INFINITY, |high, &corner| high.max(corner)) - OFFSET,
+        );
+        Self { bvh, triangles, uvs, masked: room.masked, mask: room.mask, inside }
     }
 
     /// The first wall that a ray from a free point meets. `None` if it leaves through the window.
@@ -63,18 +65,14 @@ impl Scene {
         });
         hit.t.is_finite().then(|| {
             let normal = Vec3::from(self.triangles[triangle].compute_normal());
-            SurfacePoint { position: origin + hit.t * direction, normal: -normal * normal.dot(direction).signum() }
+            let position = (origin + hit.t * direction).clamp(self.inside.0, self.inside.1);
+            SurfacePoint { position, normal: -normal * normal.dot(direction).signum() }
         })
     }
 
-    /// The first wall that a ray from a wall meets.
-    pub(crate) fn trace_from(&self, start: &SurfacePoint, direction: Vec3) -> Option<SurfacePoint> {
-        self.trace(start.ray_origin(), direction)
-    }
-
-    /// Whether a ray from a wall leaves the room, so that the sky is seen along it.
-    pub(crate) fn sees_sky(&self, start: &SurfacePoint, direction: Vec3) -> bool {
-        let ray = Ray::new_inf(start.ray_origin().into(), direction.into());
+    /// Whether a ray leaves the room, so that the sky is seen along it.
+    pub(crate) fn sees_sky(&self, origin: Vec3, direction: Vec3) -> bool {
+        let ray = Ray::new_inf(origin.into(), direction.into());
         self.bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, self.bvh.primitive_indices[slot] as usize))
     }
 

@@ -28,7 +28,7 @@ impl Sky {
         Self { image }
     }
 
-    /// Reads an OpenEXR or a Radiance file.
+    /// Reads an `OpenEXR` or a Radiance file.
     pub(crate) fn read(path: &std::path::Path) -> Result<Self, Error> {
         let image = read_rgb(path)?;
         if let Some(i) = image.pixels.iter().position(|texel| !texel.is_finite()) {
@@ -53,13 +53,22 @@ impl Sky {
         self.image.pixels.iter().map(|texel| texel.dot(LUMINANCE)).collect()
     }
 
-    /// Radiance along a unit direction: that of the texel it falls into.
+    /// Radiance along a unit direction, interpolated between the middles of the four nearest texels.
     pub(crate) fn radiance(&self, direction: Vec3) -> Vec3 {
+        let size = vec2(self.image.width as f32, self.image.height as f32);
+        let point = latitude_longitude(direction) * size - 0.5;
+        let low = point.floor();
+        let weight = point - low;
+        let row = |y: f32| self.texel(low.x, y).lerp(self.texel(low.x + 1.0, y), weight.x);
+        row(low.y).lerp(row(low.y + 1.0), weight.y)
+    }
+
+    /// A texel; its column may lie one beyond the image's edges, which meet, and its row one beyond the poles.
+    fn texel(&self, x: f32, y: f32) -> Vec3 {
         let (width, height) = (self.image.width, self.image.height);
-        let texel = latitude_longitude(direction) * vec2(width as f32, height as f32);
-        let x = (texel.x as usize).min(width - 1);
-        let y = (texel.y as usize).min(height - 1);
-        self.image.pixels[y * width + x]
+        let column = (x + width as f32) as usize % width;
+        let row = (y.max(0.0) as usize).min(height - 1);
+        self.image.pixels[row * width + column]
     }
 }
 
