@@ -11,8 +11,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use render::{
-    Budget, Camera, Film, Image, Lighting, Opening, PathTracer, Progressive, Reference, Room, Scene, Sky, Strategy,
-    Window, read_rgb,
+    Budget, Camera, Film, Image, Opening, PathTracer, Progressive, Reference, Sky, Strategy, Window, World, read_rgb,
 };
 
 /// Samples a pixel of the two renderings whose errors are compared.
@@ -51,20 +50,18 @@ impl Case {
     fn check(&self) {
         let (Some(sky), Some(reference)) = (data("sky.exr"), data(self.reference)) else { return };
         let sky = Sky::new(rows_off_poles(&read_rgb(&sky).unwrap()));
+        let world = World::new(self.window, self.opening, sky).unwrap();
         let reference = Reference::exact(read_rgb(&reference).unwrap());
         for strategy in [Strategy::Environment, Strategy::EnvironmentAndPortals] {
-            let [few, many] = [FEW, MANY].map(|samples| self.render(&sky, strategy, samples));
+            let [few, many] = [FEW, MANY].map(|samples| self.render(&world, strategy, samples));
             println!("{} {:?} {strategy:?}:", self.reference, self.opening);
             check_mean(&many, &reference);
             check_convergence(&few, &many, &reference);
         }
     }
 
-    fn render(&self, sky: &Sky, strategy: Strategy, samples: u32) -> Film {
-        let room = Room::new(self.window, self.opening);
-        let lighting = Lighting::new(&room, sky).unwrap();
-        let scene = Scene::new(room);
-        let tracer = PathTracer { scene: &scene, sky, lighting: &lighting, strategy, bounces: self.bounces };
+    fn render(&self, world: &World, strategy: Strategy, samples: u32) -> Film {
+        let tracer = PathTracer { world, strategy, bounces: self.bounces };
         Progressive { tracer, camera: Camera::scaled(1), seed: samples }.render(Budget::Samples(samples), |_| ()).0
     }
 }

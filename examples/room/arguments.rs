@@ -8,8 +8,8 @@ use crate::render::{Budget, Error, Opening, Window};
 
 /// What `--help` prints.
 pub(crate) const HELP: &str = "\
-Renders a room that daylight enters through a window, twice in the same time: once with cosine and environment
-sampling, once with portal sampling as well. Prints the errors and writes both images side by side.
+Renders a room that daylight enters through a window, twice in the same time: (a) with cosine and environment
+sampling, and (b) with portal sampling as well. Prints the errors and writes both images side by side.
 
 Usage: cargo run --release --example room -- [OPTIONS]
 
@@ -27,8 +27,8 @@ Rendering:
   --reference FILE            .exr to compare with, instead of rendering one
 
 Output:
-  --output FILE               both images side by side, .png [room.png]
-  --exr FILE                  the image with portal sampling in linear RGB, .exr
+  --output FILE               a on the left and b on the right, .png [room.png]
+  --exr FILE                  b alone in linear RGB, .exr
 ";
 
 /// What was asked for.
@@ -76,7 +76,7 @@ impl Arguments {
                 Long("bounces") => arguments.bounces = parser.value()?.parse_with(positive)?,
                 Long("seconds") => arguments.budget = Budget::Seconds(parser.value()?.parse_with(duration)?),
                 Long("spp") => arguments.budget = Budget::Samples(parser.value()?.parse_with(positive)?),
-                Long("scale") => arguments.scale = Some(parser.value()?.parse_with(positive)?),
+                Long("scale") => arguments.scale = Some(parser.value()?.parse_with(scale)?),
                 Long("seed") => arguments.seed = parser.value()?.parse()?,
                 Long("reference") => arguments.reference = Some(parser.value()?.into()),
                 Long("output") => arguments.output = parser.value()?.into(),
@@ -107,6 +107,10 @@ fn opening(name: &str) -> Result<Opening, &'static str> {
 
 fn positive(number: &str) -> Result<u32, &'static str> {
     number.parse().ok().filter(|&number| number > 0).ok_or("not a whole number above zero")
+}
+
+fn scale(number: &str) -> Result<u32, &'static str> {
+    number.parse().ok().filter(|scale| (1..=100).contains(scale)).ok_or("not a whole number from 1 to 100")
 }
 
 fn duration(number: &str) -> Result<f64, &'static str> {

@@ -13,13 +13,15 @@ use std::process::ExitCode;
 use arguments::Arguments;
 use indicatif::{ProgressBar, ProgressStyle};
 use render::{
-    Budget, Camera, Daylight, Error, Film, Lighting, PathTracer, Progressive, Reference, Room, Scene, Sky, Strategy,
-    read_rgb, write_rgb,
+    Budget, Camera, Daylight, Error, Film, Image, PathTracer, Progressive, Reference, Sky, Strategy, World, read_rgb,
+    write_rgb,
 };
 use table::Row;
 
 /// How many times as long as an image its reference is rendered.
 const REFERENCE_FACTOR: u32 = 4;
+/// Scale of an image that is not compared with a given reference.
+const DEFAULT_SCALE: u32 = 3;
 
 fn main() -> ExitCode {
     let result = match Arguments::parse() {
@@ -41,48 +43,53 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let given = arguments.reference.as_deref().map(read_rgb).transpose()?;
-    let camera = Camera::scaled(match &given {
-        Some(image) => scale_of(image, arguments.scale)?,
-        None => arguments.scale.unwrap_or(3),
-    });
-    let sky = match &arguments.environment {
-        Some(path) => Sky::read(path)?,
-        None => Daylight::new().draw(),
-    };
-    let room = Room::new(arguments.window, arguments.opening);
-    let lighting = Lighting::new(&room, &sky)?;
-    let scene = Scene::new(room);
+    let scale = given.as_ref().map(|image| scale_of(image, arguments.scale)).transpose()?;
+    let camera = Camera::scaled(scale.or(arguments.scale).unwrap_or(DEFAULT_SCALE));
+    let world = World::new(arguments.window, arguments.opening, sky(arguments)?)?;
 
     let render = |name: &str, strategy: Strategy, seed: u32, budget: Budget| {
-        let tracer = PathTracer { scene: &scene, sky: &sky, lighting: &lighting, strategy, bounces: arguments.bounces };
+        let tracer = PathTracer { world: &world, strategy, bounces: arguments.bounces };
         with_progress_bar(name, &Progressive { tracer, camera, seed }, budget)
     };
-    let seed = arguments.seed;
-    let (without, without_seconds) = render("without portals", Strategy::Environment, seed, arguments.budget);
-    let (with, with_seconds) = render("with portals", Strategy::EnvironmentAndPortals, seed, arguments.budget);
-    let reference = match given {
-        Some(image) => Reference::exact(image),
-        None => {
-            let budget = arguments.budget.times(REFERENCE_FACTOR);
+    let (seed, budget) = (arguments.seed, arguments.budget);
+    let (without, without_seconds) = render("without portals", Strategy::Environment, seed, budget);
+    let (with, with_seconds) = render("with portals", Strategy::EnvironmentAndPortals, seed, budget);
+    let reference = given.map_or_else(
+        || {
+            let budget = budget.times(REFERENCE_FACTOR);
             Reference::from_film(&render("reference", Strategy::EnvironmentAndPortals, !seed, budget).0)
-        }
-    };
+        },
+        Reference::exact,
+    );
 
     let rows = [
         Row { name: "a  cosine + environment", film: &without, seconds: without_seconds },
         Row { name: "b  cosine + environment + portals", film: &with, seconds: with_seconds },
     ];
-    table::print(&rows, &reference);
-    picture::write(&arguments.output, &[&without.image(), &with.image()], reference.image())?;
-    println!("{} shows a on the left and b on the right.", arguments.output.display());
+    let written = write_images(arguments, &without.image(), &with.image(), &reference);
+    table::print(&rows, &reference)?;
+    written
+}
+
+/// The sky that was asked for.
+fn sky(arguments: &Arguments) -> Result<Sky, Error> {
+    match &arguments.environment {
+        Some(path) => Ok(Sky::new(read_rgb(path)?)),
+        None => Ok(Daylight::new().draw()),
+    }
+}
+
+/// Writes both images next to each other and, if asked for, the second one in full range.
+fn write_images(arguments: &Arguments, a: &Image, b: &Image, reference: &Reference) -> Result<(), Error> {
+    picture::write(&arguments.output, &[a, b], reference.image())?;
     match &arguments.exr {
-        Some(path) => write_rgb(path, &with.image()),
+        Some(path) => write_rgb(path, b),
         None => Ok(()),
     }
 }
 
 /// The camera's scale that gives images of a reference's size, unless another one was asked for.
-fn scale_of(reference: &render::Image, asked: Option<u32>) -> Result<u32, Error> {
+fn scale_of(reference: &Image, asked: Option<u32>) -> Result<u32, Error> {
     let (width, height) = (reference.width, reference.height);
     let scale = Camera::scale_of(width, height)
         .ok_or_else(|| format!("the reference has {width} x {height} pixels, not a multiple of 96 x 72"))?;

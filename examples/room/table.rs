@@ -1,5 +1,7 @@
 //! The comparison in numbers.
 
+use std::io::{self, Write};
+
 use crate::render::{Film, Reference};
 
 /// One line of the table.
@@ -10,16 +12,18 @@ pub(crate) struct Row<'a> {
 }
 
 /// Prints the errors of some renderings, and what each gains over the first one.
-pub(crate) fn print(rows: &[Row<'_>], reference: &Reference) {
-    println!("{:36} {:>8} {:>8} {:>10} {:>12} {:>8}", "", "spp", "seconds", "relMSE", "relMSE x s", "gain");
+pub(crate) fn print(rows: &[Row<'_>], reference: &Reference) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{:36} {:>8} {:>8} {:>10} {:>12} {:>8}", "", "spp", "seconds", "relMSE", "relMSE x s", "gain")?;
     let mut baseline = None;
     for Row { name, film, seconds } in rows {
         let error = reference.rel_mse(&film.image());
         let cost = error * seconds;
         let gain = *baseline.get_or_insert(cost) / cost;
-        println!("{name:36} {:>8} {seconds:>8.2} {error:>10.3e} {cost:>12.3e} {gain:>8.1}", film.samples());
+        writeln!(out, "{name:36} {:>8} {seconds:>8.2} {error:>10.3e} {cost:>12.3e} {gain:>8.1}", film.samples())?;
     }
     if reference.noise() > 0.0 {
-        println!("The reference's own noise, relMSE {:.1e}, is subtracted.", reference.noise());
+        writeln!(out, "The reference's own noise, relMSE {:.1e}, is subtracted.", reference.noise())?;
     }
+    Ok(())
 }

@@ -17,18 +17,18 @@ mod room;
 mod scene;
 mod sky;
 mod window;
+mod world;
 
 pub(crate) use camera::Camera;
 pub(crate) use daylight::Daylight;
 pub(crate) use file::{read_rgb, write_rgb};
 pub(crate) use film::{Film, Image, Reference};
-pub(crate) use lighting::Lighting;
 pub(crate) use path::{PathTracer, Strategy};
 pub(crate) use progressive::{Budget, Progressive};
-pub(crate) use room::{Opening, Room};
-pub(crate) use scene::Scene;
+pub(crate) use room::Opening;
 pub(crate) use sky::Sky;
 pub(crate) use window::Window;
+pub(crate) use world::World;
 
 /// What can go wrong here ends the program, so a message is all that is kept of it.
 pub(crate) type Error = Box<dyn core::error::Error + Send + Sync>;

@@ -5,9 +5,9 @@ use core::f32::consts::{FRAC_1_PI, TAU};
 use glam::{Vec2, Vec3};
 use rand_pcg::{Pcg32, rand_core::Rng};
 
-use super::lighting::{Lighting, Proposal};
-use super::scene::{Scene, SurfacePoint};
-use super::sky::Sky;
+use super::lighting::Proposal;
+use super::scene::SurfacePoint;
+use super::world::World;
 
 /// Albedo of all walls.
 const ALBEDO: f32 = 0.6;
@@ -38,9 +38,7 @@ impl Random {
 
 /// Estimates the radiance that arrives along a ray.
 pub(crate) struct PathTracer<'a> {
-    pub(crate) scene: &'a Scene,
-    pub(crate) sky: &'a Sky,
-    pub(crate) lighting: &'a Lighting,
+    pub(crate) world: &'a World,
     pub(crate) strategy: Strategy,
     /// How many walls light may touch on its way: 1 for direct light alone.
     pub(crate) bounces: u32,
@@ -49,13 +47,13 @@ pub(crate) struct PathTracer<'a> {
 impl PathTracer<'_> {
     /// One path that starts along a ray.
     pub(crate) fn radiance(&self, origin: Vec3, direction: Vec3, random: &mut Random) -> Vec3 {
-        let Some(mut x) = self.scene.trace(origin, direction) else { return self.sky.radiance(direction) };
+        let Some(mut x) = self.world.scene.trace(origin, direction) else { return self.world.sky.radiance(direction) };
         let mut radiance = Vec3::ZERO;
         let mut throughput = 1.0;
         for _ in 0..self.bounces {
             radiance += throughput * self.light_by_light_samples(&x, random);
             let direction = sample_cosine(x.normal, random.take());
-            let Some(next) = self.scene.trace(x.position, direction) else {
+            let Some(next) = self.world.scene.trace(x.position, direction) else {
                 return radiance + throughput * self.reflected(&x, direction, self.density(&x, direction));
             };
             throughput *= ALBEDO;
@@ -66,11 +64,12 @@ impl PathTracer<'_> {
 
     /// Direct light by one direction of each light sampler.
     fn light_by_light_samples(&self, x: &SurfacePoint, random: &mut Random) -> Vec3 {
-        let mut sum = self
-            .light_along(x, self.lighting.sample_environment(random.take()), |direction| self.portal_pdf(x, direction));
+        let mut sum = self.light_along(x, self.world.lighting.sample_environment(random.take()), |direction| {
+            self.portal_pdf(x, direction)
+        });
         if self.strategy == Strategy::EnvironmentAndPortals {
-            sum += self.light_along(x, self.lighting.sample_portals(x, random.take()), |direction| {
-                self.lighting.environment_pdf(direction)
+            sum += self.light_along(x, self.world.lighting.sample_portals(x, random.take()), |direction| {
+                self.world.lighting.environment_pdf(direction)
             });
         }
         sum
@@ -80,7 +79,7 @@ impl PathTracer<'_> {
     fn light_along(&self, x: &SurfacePoint, proposal: Option<Proposal>, other_pdf: impl Fn(Vec3) -> f32) -> Vec3 {
         match proposal {
             Some(Proposal { direction, pdf })
-                if x.normal.dot(direction) > 0.0 && self.scene.sees_sky(x.position, direction) =>
+                if x.normal.dot(direction) > 0.0 && self.world.scene.sees_sky(x.position, direction) =>
             {
                 self.reflected(x, direction, cosine_pdf(x.normal, direction) + pdf + other_pdf(direction))
             }
@@ -91,19 +90,19 @@ impl PathTracer<'_> {
     /// The sky's light that is reflected at `x` from a direction, over the sum of the direction's densities under all
     /// techniques: the balance heuristic, for one sample of each.
     fn reflected(&self, x: &SurfacePoint, direction: Vec3, density: f32) -> Vec3 {
-        ALBEDO * cosine_pdf(x.normal, direction) / density * self.sky.radiance(direction)
+        ALBEDO * cosine_pdf(x.normal, direction) / density * self.world.sky.radiance(direction)
     }
 
     /// Sum of a direction's densities under all techniques.
     fn density(&self, x: &SurfacePoint, direction: Vec3) -> f32 {
-        cosine_pdf(x.normal, direction) + self.lighting.environment_pdf(direction) + self.portal_pdf(x, direction)
+        cosine_pdf(x.normal, direction) + self.world.lighting.environment_pdf(direction) + self.portal_pdf(x, direction)
     }
 
     /// A direction's density under portal sampling: zero where portals are not sampled.
     fn portal_pdf(&self, x: &SurfacePoint, direction: Vec3) -> f32 {
         match self.strategy {
             Strategy::Environment => 0.0,
-            Strategy::EnvironmentAndPortals => self.lighting.portal_pdf(x, direction),
+            Strategy::EnvironmentAndPortals => self.world.lighting.portal_pdf(x, direction),
         }
     }
 }

@@ -5,7 +5,6 @@ use core::f32::consts::{PI, TAU};
 use glam::{Vec2, Vec3, vec2, vec3};
 
 use super::film::Image;
-use super::{Error, read_rgb};
 
 /// Weights of the luminance of linear sRGB.
 pub(crate) const LUMINANCE: Vec3 = vec3(0.2126, 0.7152, 0.0722);
@@ -26,16 +25,6 @@ impl Sky {
             *texel = texel.max(Vec3::ZERO);
         }
         Self { image }
-    }
-
-    /// Reads an `OpenEXR` or a Radiance file.
-    pub(crate) fn read(path: &std::path::Path) -> Result<Self, Error> {
-        let image = read_rgb(path)?;
-        if let Some(i) = image.pixels.iter().position(|texel| !texel.is_finite()) {
-            let (x, y) = (i % image.width, i / image.width);
-            return Err(format!("{}: texel ({x}, {y}) is {}", path.display(), image.pixels[i]).into());
-        }
-        Ok(Self::new(image))
     }
 
     /// Columns of the image.
@@ -74,9 +63,9 @@ impl Sky {
 
 /// Column and row, both from 0 to 1, of a unit direction.
 pub(crate) fn latitude_longitude(direction: Vec3) -> Vec2 {
-    let phi = direction.x.atan2(-direction.z);
+    let turns = direction.x.atan2(-direction.z) / TAU;
     let theta = direction.y.clamp(-1.0, 1.0).acos();
-    vec2(if phi < 0.0 { phi + TAU } else { phi } / TAU, theta / PI)
+    vec2(if turns < 0.0 { turns + 1.0 } else { turns }, theta / PI)
 }
 
 /// The unit direction of a column and a row, both from 0 to 1.
