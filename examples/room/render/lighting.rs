@@ -23,6 +23,8 @@ pub(crate) struct Lighting {
 
 impl Lighting {
     /// Hands the sky's luminance and the windows over.
+    ///
+    /// One number a texel guides well enough; the radiance itself is looked up in RGB, interpolated in the same way.
     pub(crate) fn new(room: &Room, sky: &Sky) -> Result<Self, Error> {
         let environment = Environment::from_lat_long(sky.width(), sky.height(), &sky.luminance(), Filter::Bilinear)?
             .with_rotation(Environment::Y_UP_LAT_LONG)?;

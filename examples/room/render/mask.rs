@@ -13,7 +13,7 @@ pub(crate) struct Mask {
 }
 
 impl Mask {
-    /// Draws the openings that lie between two corners of the wall. `u` runs along z and `v` along y.
+    /// Draws a window over the box around its openings; `u` runs along z and `v` along y.
     pub(crate) fn draw(window: Window) -> Self {
         let outlines = window.outlines();
         let (low, high) = window.bounds();
