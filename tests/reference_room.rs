@@ -1,7 +1,7 @@
 //! Renders the reference room with the example's renderer, and compares it with images by another renderer.
 //!
 //! The references were rendered with Mitsuba 3, which knows no portals. It interpolates the sky bilinearly, as the
-//! example does. Their own noise is a relative mean squared error of about 1e-4.
+//! example does. Their own noise is a relative mean squared error of about 1e-4 for direct light, 2.5e-3 for more bounces.
 
 #[expect(dead_code, unused_imports, reason = "the example uses the rest")]
 #[path = "../examples/room/render/mod.rs"]
