@@ -23,7 +23,7 @@ fn timing() {
         let mut best = f64::INFINITY;
         for _ in 0..19 {
             let start = Instant::now();
-            u.iter().for_each(|&u| drop(black_box(environment.sample(u))));
+            u.iter().for_each(|&u| _ = black_box(environment.sample(u)));
             best = best.min(start.elapsed().as_nanos() as f64 / 65536.0);
         }
         std::println!("nearly uniform, {size} x {size}: sample {best:.1} ns");
@@ -44,13 +44,13 @@ fn timing() {
             }
             std::println!("{name}: {what} {best:.1} ns");
         };
-        time("sample", &mut || u.iter().for_each(|&u| drop(black_box(view.sample(u)))));
-        time("pdf", &mut || directions.iter().for_each(|&d| drop(black_box(view.pdf(d)))));
+        time("sample", &mut || u.iter().for_each(|&u| _ = black_box(view.sample(u))));
+        time("pdf", &mut || directions.iter().for_each(|&d| _ = black_box(view.pdf(d))));
         for radius in [0.001, 0.01, 0.1, 0.5] {
             let region =
                 |&direction: &Vec3| Footprint { direction, sin_radius: radius, solid_angle: PI * radius * radius };
             time(&alloc::format!("average, radius {radius}"), &mut || {
-                directions.iter().for_each(|d| drop(black_box(view.average(&region(d)))));
+                directions.iter().for_each(|d| _ = black_box(view.average(&region(d))));
             });
         }
     }
