@@ -34,7 +34,7 @@ impl Lighting {
         let window = &room.portal;
         let mut portal = Mesh::portal(&window.positions, &window.indices).sides(Sides::One);
         if let Some(mask) = &room.mask {
-            let texture = builder.add_texture(transmittance(mask))?;
+            let texture = builder.add_texture(transmittance(mask)?);
             portal = portal.weight(Weight::Texture(texture)).uvs(&window.uvs);
         }
         builder.add_mesh(&portal)?;
@@ -72,6 +72,8 @@ fn shading_point(x: &SurfacePoint) -> ShadingPoint {
 }
 
 /// How much light each place of a window lets through, read as the ray caster reads it.
-fn transmittance(mask: &Mask) -> Texture<'_> {
-    Texture::new(mask.size(), mask.size(), mask.texels()).filter(Filter::Nearest).wrap(Wrap::Clamp, Wrap::Clamp)
+fn transmittance(mask: &Mask) -> Result<Texture<'_>, fanlight::Error> {
+    let size = mask.size() as usize;
+    let texture = Texture::new(size, size, mask.texels())?;
+    Ok(texture.filter(Filter::Nearest).wrap(Wrap::Clamp, Wrap::Clamp))
 }

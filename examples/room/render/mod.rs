@@ -8,7 +8,6 @@ mod camera;
 mod daylight;
 mod file;
 mod film;
-#[path = "lighting_stub.rs"]
 mod lighting;
 mod mask;
 mod path;
