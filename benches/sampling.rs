@@ -1,0 +1,161 @@
+//! Times of building and sampling, one thread.
+//!
+//! `cloud-N` is `N` small triangles at random in the unit cube, each a mesh with a radiance of its own; the shading
+//! points lie in and around the cube. The map between sphere and square is part of `environment/radiance`.
+
+use core::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion};
+use fanlight::{Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight};
+use glam::{DVec3, Vec3};
+
+/// Shading points, and vectors of random numbers, that are gone through in a circle.
+const POINTS: usize = 1 << 16;
+
+/// PCG32 (O'Neill 2014), XSH-RR 64/32.
+struct Pcg {
+    state: u64,
+    increment: u64,
+}
+
+impl Pcg {
+    fn new(seed: u64, sequence: u64) -> Self {
+        let mut pcg = Self { state: 0, increment: (sequence << 1) | 1 };
+        pcg.next_u32();
+        pcg.state = pcg.state.wrapping_add(seed);
+        pcg.next_u32();
+        pcg
+    }
+
+    fn next_u32(&mut self) -> u32 {
+        let old = self.state;
+        self.state = old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(self.increment);
+        ((((old >> 18) ^ old) >> 27) as u32).rotate_right((old >> 59) as u32)
+    }
+
+    /// Uniform in `[0, 1)`.
+    fn f(&mut self) -> f64 {
+        f64::from(self.next_u32() >> 8) / 16_777_216.0
+    }
+
+    fn vector(&mut self) -> DVec3 {
+        let (x, y, z) = (self.f(), self.f(), self.f());
+        DVec3::new(x, y, z)
+    }
+
+    fn direction(&mut self) -> Vec3 {
+        let z = 1.0 - 2.0 * self.f();
+        let (sin, cos) = (core::f64::consts::TAU * self.f()).sin_cos();
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        DVec3::new(radius * cos, radius * sin, z).as_vec3()
+    }
+}
+
+/// Vertices and radiance of the triangles of cloud-N.
+fn cloud(n: usize) -> Vec<([Vec3; 3], f32)> {
+    let mut pcg = Pcg::new(1, 1);
+    let size = 0.3 / (n as f64).cbrt();
+    let mut triangle = || {
+        let center = pcg.vector();
+        let vertices = [(); 3].map(|()| (center + size * (2.0 * pcg.vector() - 1.0)).as_vec3());
+        (vertices, (6.0 * pcg.f() - 3.0).exp2() as f32)
+    };
+    let cloud: Vec<_> = (0..n).map(|_| triangle()).collect();
+    if n == 10_000 {
+        let ([a, ..], radiance) = cloud[0];
+        assert_eq!((a, radiance), (Vec3::new(0.791_256_3, 0.089_440_353, 0.748_418_3), 4.868_061_5));
+    }
+    cloud
+}
+
+fn build(cloud: &[([Vec3; 3], f32)]) -> LightSampler {
+    let mut builder = LightSampler::builder();
+    for (vertices, radiance) in cloud {
+        let mesh = Mesh::emitter(vertices, &[[0, 1, 2]]).weight(Weight::Constant(*radiance));
+        builder.add_mesh(&mesh).expect("the cloud is finite");
+    }
+    builder.build().expect("the cloud is small")
+}
+
+fn points() -> Vec<ShadingPoint> {
+    let mut pcg = Pcg::new(2, 2);
+    let mut point = || {
+        let position = (2.0 * pcg.vector() - 0.5).as_vec3();
+        ShadingPoint::surface(position, pcg.direction())
+    };
+    (0..POINTS).map(|_| point()).collect()
+}
+
+fn numbers() -> Vec<[f32; 3]> {
+    let mut pcg = Pcg::new(3, 3);
+    (0..POINTS).map(|_| pcg.vector().as_vec3().to_array()).collect()
+}
+
+/// Calls `work` with 0, 1, 2 ... below `count`, again and again.
+fn in_circle<T>(bencher: &mut criterion::Bencher<'_>, count: usize, work: impl Fn(usize) -> T) {
+    let mut i = 0;
+    bencher.iter(|| {
+        i = if i + 1 < count { i + 1 } else { 0 };
+        work(black_box(i))
+    });
+}
+
+fn lights(criterion: &mut Criterion) {
+    let (points, numbers) = (points(), numbers());
+    for n in [100, 1_000, 10_000, 100_000] {
+        let cloud = cloud(n);
+        let sampler = build(&cloud);
+        let mut group = criterion.benchmark_group(format!("cloud-{n}"));
+        group.bench_function("sample", |b| in_circle(b, POINTS, |i| sampler.sample(&points[i], numbers[i])));
+
+        // Densities of what was drawn: elsewhere they would be cheap zeros.
+        let drawn: Vec<(ShadingPoint, Hit, Vec3)> = points
+            .iter()
+            .zip(&numbers)
+            .filter_map(|(x, u)| sampler.sample(x, *u).map(|sample| (*x, sample.hit, sample.direction)))
+            .collect();
+        group.bench_function("pmf", |b| {
+            in_circle(b, drawn.len(), |i| sampler.pmf(&drawn[i].0, drawn[i].1.triangle));
+        });
+        group.bench_function("pdf", |b| in_circle(b, drawn.len(), |i| sampler.pdf(&drawn[i].0, &drawn[i].1)));
+        group.bench_function("pdf_direction", |b| {
+            in_circle(b, drawn.len(), |i| sampler.pdf_direction(&drawn[i].0, drawn[i].2));
+        });
+        group.finish();
+
+        let mut group = criterion.benchmark_group("build");
+        group.sample_size(10);
+        group.bench_with_input(BenchmarkId::new("cloud", n), &cloud, |b, cloud| b.iter(|| build(cloud)));
+        group.finish();
+    }
+}
+
+/// A sky that brightens towards the zenith, with a sun of half a degree.
+fn environment(criterion: &mut Criterion) {
+    const SIZE: usize = 1024;
+    let sun = Vec3::new(0.3, 0.8, 0.5).normalize();
+    let texel = |i: usize| {
+        let (u, v) = (((i % 2048) as f32 + 0.5) / 2048.0, ((i / 2048) as f32 + 0.5) / SIZE as f32);
+        let ((sin, cos), (sin_phi, cos_phi)) =
+            ((core::f32::consts::PI * v).sin_cos(), (core::f32::consts::TAU * u).sin_cos());
+        let direction = Vec3::new(cos_phi * sin, -sin_phi * sin, cos);
+        if direction.dot(sun) > 0.5_f32.to_radians().cos() { 20_000.0 } else { 0.2 + 0.8 * cos.max(0.0) }
+    };
+    let sky: Vec<f32> = (0..2048 * SIZE).map(texel).collect();
+    let sky = Environment::from_lat_long_with_size(2048, SIZE, &sky, Filter::Nearest, SIZE).expect("a valid sky");
+    let numbers = numbers();
+    let mut pcg = Pcg::new(4, 4);
+    let directions: Vec<Vec3> = (0..POINTS).map(|_| pcg.direction()).collect();
+    let mut group = criterion.benchmark_group("environment");
+    group.bench_function("radiance", |b| in_circle(b, POINTS, |i| sky.radiance(directions[i])));
+    group.bench_function("pdf", |b| in_circle(b, POINTS, |i| sky.pdf(directions[i])));
+    group.bench_function("sample", |b| in_circle(b, POINTS, |i| sky.sample([numbers[i][0], numbers[i][1]])));
+    group.finish();
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    environment(&mut criterion);
+    lights(&mut criterion);
+    criterion.final_summary();
+}
