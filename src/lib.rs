@@ -72,7 +72,7 @@
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
 //! - punctual lights: points, spots and directions without an extent.
-//! - updates of a built sampler, except that the environment can be turned. Building again is meant to be cheap.
+//! - updates of a built sampler, except that the environment can be turned.
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
 //!
 //! # Units and measures
@@ -98,7 +98,7 @@
 //!
 //! # Without `std`
 //!
-//! The crate is `no_std` and depends on `alloc`. Building allocates; sampling does not, with one exception:
+//! The crate is `no_std` and depends on `alloc`. Building and loading allocate; sampling does not, with one exception:
 //! [`sample_split`](LightSampler::sample_split) appends to a `SmallVec`, which allocates if it is too small.
 //! [`LightSamplerView`] borrows all of its data: a sampler can be written with
 //! [`to_bytes`](LightSampler::to_bytes), mapped from a file, and read with
