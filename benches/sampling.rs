@@ -63,7 +63,7 @@ fn cloud(n: usize) -> Vec<([Vec3; 3], f32)> {
     let cloud: Vec<_> = (0..n).map(|_| triangle()).collect();
     if n == 10_000 {
         let ([a, ..], radiance) = cloud[0];
-        assert_eq!((a, radiance), (Vec3::new(0.791_256_3, 0.089_440_35, 0.748_418_3), 4.868_061_5));
+        assert_eq!((a, radiance), (Vec3::new(0.791_256_3, 0.089_440_35, 0.748_418_33), 4.868_061_5));
     }
     cloud
 }
