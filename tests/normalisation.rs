@@ -1,0 +1,151 @@
+//! For every shading point, the density of all points of all triangles integrates to the probability that `sample`
+//! returns one.
+
+#[expect(dead_code, reason = "every test uses a part of what they share")]
+mod common;
+
+use common::density::{OnTriangle, id, probes};
+use common::lights::{ARITIES, Lights, build};
+use common::parallel;
+use common::pcg::Pcg32;
+use common::scene::{Content, Scene, random_point};
+use common::statistics::{binomial_p, sidak};
+use fanlight::{Hit, LightSample, ShadingPoint};
+
+/// Error granted to an integral.
+const TOLERANCE: f64 = 1e-4;
+/// Significance of all scenes together.
+const SIGNIFICANCE: f64 = 0.01;
+/// Triangles that together have less probability than this are left out.
+const NEGLIGIBLE: f64 = 2e-5;
+
+struct Found {
+    name: String,
+    integral: f64,
+    samples: usize,
+    missed: usize,
+}
+
+/// Integral of the density over all triangles.
+fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[LightSample], wrong: bool) -> f64 {
+    let count = scene.triangles().count();
+    let varies = !scene.images.is_empty() || !matches!(scene.sky, common::scene::Sky::Constant(_));
+    let least_depth = if !varies {
+        0
+    } else if count < 1000 {
+        4
+    } else {
+        2
+    };
+    let probes = probes(scene, samples);
+    let pdf = |hit: &Hit| {
+        let factor = if wrong && hit.barycentrics[0] > 0.5 { 1.1 } else { 1.0 };
+        factor * f64::from(lights.pdf(x, hit))
+    };
+    let mut triangles: Vec<_> = scene.triangles().map(|t| (f64::from(lights.pmf(x, id(t))), t)).collect();
+    triangles.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut left: f64 = triangles.iter().map(|t| t.0).sum();
+    assert!(left <= 1.0 + 1e-5, "{}: the triangles' probabilities add up to {left}", scene.name);
+    let mut sum = 0.0;
+    for (pmf, triangle) in triangles {
+        if left < NEGLIGIBLE {
+            break;
+        }
+        left -= pmf;
+        let on = OnTriangle::new(scene, triangle, x, &pdf);
+        sum += on.integrate(0, least_depth, &probes[triangle.0][triangle.1])[0];
+    }
+    sum
+}
+
+fn examine(content: Content, number: usize, receiver: usize, count: usize, wrong: bool) -> Found {
+    let mut pcg = Pcg32::new(100 + number as u64, 11);
+    let scene = Scene::random(&mut pcg, content);
+    let arities = ARITIES[number % ARITIES.len()];
+    let lights = build(&scene, arities);
+    let x = random_point(&mut pcg, receiver);
+    let samples: Vec<_> = (0..count).filter_map(|_| lights.sample(&x, pcg.cube())).collect();
+    let probing = &samples[..samples.len().min(2000)];
+    let integral = integral(&scene, &*lights, &x, probing, wrong);
+    let name = format!("{} {arities:?} {:?} {x:?}", scene.name, scene.illumination);
+    Found { name, integral, samples: count, missed: count - samples.len() }
+}
+
+/// Sizes with every texturing and sky; the largest with some.
+fn contents(two_sided: bool) -> Vec<Content> {
+    let mut contents = Vec::new();
+    for triangles in [1, 2, 10, 100] {
+        for textured in [false, true] {
+            contents.extend((0..4).map(|sky| Content { triangles, textured, sky, two_sided }));
+        }
+    }
+    contents.extend((0..4).map(|sky| Content { triangles: 1000, textured: sky % 2 == 0, sky, two_sided }));
+    contents.push(Content { triangles: 10_000, textured: false, sky: 0, two_sided });
+    contents
+}
+
+/// Volumes see every two-sided light, and no sky without a black pixel hides one: nothing can be missed.
+#[test]
+fn where_all_is_visible_the_density_integrates_to_one() {
+    let contents: Vec<_> = contents(true).into_iter().filter(|content| content.sky < 2).collect();
+    let found = parallel::map(contents.len(), |i| examine(contents[i], 1000 + i, 2, 5000, false));
+    let mut worst = 0.0f64;
+    for found in &found {
+        assert_eq!(found.missed, 0, "{}", found.name);
+        worst = worst.max((found.integral - 1.0).abs());
+        assert!((found.integral - 1.0).abs() < TOLERANCE, "{}: {}", found.name, found.integral);
+    }
+    println!("{} scenes, largest deviation {worst:e}", found.len());
+}
+
+/// Everywhere else the shortfall is the rate of `None`. Each scene's binomial test has Šidák's share of 1 %.
+#[test]
+fn elsewhere_the_shortfall_is_the_rate_of_none() {
+    let contents = contents(false);
+    let count = 3 * contents.len();
+    let found = parallel::map(count, |i| examine(contents[i / 3], i / 3, i % 3, 40_000, false));
+    let significance = sidak(SIGNIFICANCE, count);
+    let (mut full, mut empty, mut least) = (0, 0, 1.0f64);
+    for found in &found {
+        let p = p_value(found);
+        assert!(
+            p > significance,
+            "{}: integral {}, missed {} of {}: p = {p:e}",
+            found.name,
+            found.integral,
+            found.missed,
+            found.samples
+        );
+        least = least.min(p);
+        full += usize::from(found.missed == 0);
+        empty += usize::from(found.missed == found.samples);
+        if found.missed == found.samples {
+            assert!(found.integral < TOLERANCE, "{}: {}", found.name, found.integral);
+        }
+    }
+    println!("{count} points: {full} always give a sample, {empty} never do; least p {least:e}");
+    // Both ends and the middle occur.
+    assert!(full > 20 && empty > 3 && full + empty < count - 5, "{full} {empty} {count}");
+}
+
+/// Probability of a rate of `None` at least as far from the shortfall, less the error granted to the integral.
+fn p_value(found: &Found) -> f64 {
+    let n = found.samples as f64;
+    let shortfall = 1.0 - found.integral;
+    if shortfall < -TOLERANCE {
+        return 0.0;
+    }
+    let rate = found.missed as f64 / n;
+    let nearest = rate.max(shortfall - TOLERANCE).min(shortfall + TOLERANCE).clamp(0.0, 1.0);
+    binomial_p(found.missed as f64, n, nearest)
+}
+
+/// The checks above see a density that is too large by a tenth on a quarter of a triangle.
+#[test]
+fn a_wrong_density_is_found() {
+    let content = Content { triangles: 10, textured: false, sky: 0, two_sided: true };
+    let right = examine(content, 1, 2, 40_000, false);
+    let wrong = examine(content, 1, 2, 40_000, true);
+    assert!((right.integral - 1.0).abs() < TOLERANCE && p_value(&right) > 0.5);
+    assert!((wrong.integral - 1.0).abs() > TOLERANCE && p_value(&wrong) < 1e-9, "{}", wrong.integral);
+}
