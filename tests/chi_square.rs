@@ -16,7 +16,7 @@ use glam::Vec3;
 const SIGNIFICANCE: f64 = 0.01;
 /// Triangles are cut into 4^DEPTH cells.
 const DEPTH: u32 = 2;
-const SAMPLES: usize = 40_000;
+const SAMPLES: usize = 100_000;
 /// Samples of each cell that guide the integration.
 const PROBES: f64 = 50.0;
 

@@ -1,0 +1,303 @@
+//! A density that `sample` reports is the density that is found for the same point later.
+
+#[expect(dead_code, reason = "every test uses a part of what they share")]
+mod common;
+
+use common::lights::{ARITIES, Lights, build};
+use common::parallel;
+use common::pcg::Pcg32;
+use common::scene::{Content, LightMesh, Paint, Scene, random_point};
+use fanlight::{LightSample, Receiver, ShadingPoint, Splitting};
+use glam::Vec3;
+
+/// Largest relative difference of two densities of one point.
+const TOLERANCE: f64 = 1e-5;
+/// Shading points of a scene.
+const POINTS: usize = 20;
+/// Scenes by their number modulo 8 that are squeezed to slivers, moved a thousand units away, or shrunk.
+const MOVED: [usize; 3] = [FLAT, FAR, SMALL];
+const FLAT: usize = 3;
+const FAR: usize = 5;
+const SMALL: usize = 7;
+
+fn differs(a: f32, b: f32, tolerance: f64) -> bool {
+    let (a, b) = (f64::from(a), f64::from(b));
+    // Negated, so that NaN differs.
+    !((a - b).abs() <= tolerance * a.abs().max(b.abs()))
+}
+
+/// Mostly uniform, now and then an end of the range, a denormal or a multiple of a power of two.
+fn hostile(pcg: &mut Pcg32) -> f32 {
+    match pcg.below(24) {
+        0 => 0.0,
+        1 => 1.0 - f32::EPSILON / 2.0,
+        2 => 1e-45,
+        3 => f32::MIN_POSITIVE * pcg.f32(),
+        4 => pcg.below(4) as f32 * 0.25,
+        5 => pcg.below(1 << 12) as f32 / 4096.0,
+        6 => (1 + pcg.below(1 << 12)) as f32 / 4096.0 - f32::EPSILON / 2.0,
+        7 => pcg.f32() * 1e-7,
+        _ => pcg.f32(),
+    }
+}
+
+fn random_scene(number: usize, pcg: &mut Pcg32) -> Scene {
+    let triangles = [1, 2, 10, 100, 1000][number % 5];
+    let content = Content { triangles, textured: pcg.below(3) > 0, sky: pcg.below(4), two_sided: pcg.below(2) == 0 };
+    let mut scene = Scene::random(pcg, content);
+    // Every other scene is moved, scaled or flattened to slivers.
+    let change = |scene: &mut Scene, f: &dyn Fn(Vec3) -> Vec3| {
+        scene.meshes.iter_mut().for_each(|mesh| mesh.positions.iter_mut().for_each(|p| *p = f(*p)));
+    };
+    match number % 8 {
+        FLAT => change(&mut scene, &|p| p * Vec3::new(1.0, 1.0, 1e-4)),
+        FAR => change(&mut scene, &|p| p + 1000.0),
+        SMALL => change(&mut scene, &|p| p * 1e-3),
+        _ => {}
+    }
+    scene
+}
+
+/// Points around the unit cube; some in the plane of a triangle or at a vertex.
+fn shading_point(number: usize, scene: &Scene, pcg: &mut Pcg32) -> ShadingPoint {
+    let mut x = random_point(pcg, number);
+    let mesh = &scene.meshes[pcg.below(scene.meshes.len())];
+    let [a, b, c] = mesh.vertices(pcg.below(mesh.indices.len()));
+    match number % 10 {
+        7 => x.position = a + 2.0 * (b - a),
+        8 => x.position = c,
+        9 => x.position = (a + b + c) / 3.0 + 1e-4 * x.position,
+        _ => x.position += a - Vec3::splat(0.5),
+    }
+    x
+}
+
+#[derive(Default)]
+struct Counts {
+    samples: u64,
+    none: u64,
+    /// `pdf` of the hit, or `pmf` of its triangle, is not what the sample says.
+    mismatches: u64,
+    /// `pdf_sample_direction` is below the sample's own density.
+    below: u64,
+    /// `pdf_direction` finds another density.
+    boundary: u64,
+    directions: u64,
+    /// Density, distance or direction that is no number.
+    broken: u64,
+    worst: f64,
+    first: Option<String>,
+}
+
+impl Counts {
+    fn add(&mut self, other: Self) {
+        self.samples += other.samples;
+        self.none += other.none;
+        self.mismatches += other.mismatches;
+        self.below += other.below;
+        self.boundary += other.boundary;
+        self.directions += other.directions;
+        self.broken += other.broken;
+        self.worst = self.worst.max(other.worst);
+        self.first = self.first.take().or(other.first);
+    }
+
+    fn check(&mut self, lights: &dyn Lights, x: &ShadingPoint, sample: &LightSample) {
+        self.samples += 1;
+        let pdf = lights.pdf(x, &sample.hit);
+        let difference = (f64::from(pdf) / f64::from(sample.pdf) - 1.0).abs();
+        self.worst = self.worst.max(difference);
+        if differs(pdf, sample.pdf, TOLERANCE) {
+            self.mismatches += 1;
+            self.first.get_or_insert_with(|| format!("{sample:?} at {x:?}: pdf {pdf}"));
+        }
+        let [b1, b2] = sample.hit.barycentrics;
+        let finite = sample.position.is_finite() && sample.direction.is_normalized() && sample.normal.is_normalized();
+        let positive = [sample.pdf, sample.pdf_area, sample.pmf, sample.distance, b1, b2, 1.0 - b1 - b2];
+        let in_range = |value: &f32| value.is_finite() && *value >= 0.0;
+        if !(finite && positive[..3].iter().all(|value| *value > 0.0) && positive.iter().all(in_range)) {
+            self.broken += 1;
+            self.first.get_or_insert_with(|| format!("{sample:?} at {x:?}"));
+        }
+    }
+
+    fn check_direction(&mut self, lights: &dyn Lights, x: &ShadingPoint, sample: &LightSample) {
+        self.directions += 1;
+        if differs(lights.pmf(x, sample.hit.triangle), sample.pmf, TOLERANCE) {
+            self.mismatches += 1;
+            self.first.get_or_insert_with(|| format!("{sample:?} at {x:?}: pmf"));
+        }
+        let along = lights.pdf_sample_direction(x, sample);
+        if !(along >= sample.pdf && along.is_finite()) {
+            self.below += 1;
+            self.first.get_or_insert_with(|| format!("{sample:?} at {x:?}: along the direction {along}"));
+        }
+        if differs(lights.pdf_direction(x, sample.direction), along, 1e-2) {
+            self.boundary += 1;
+        }
+    }
+}
+
+/// Samples of one random scene. One of `every` is also looked up as a direction.
+fn examine(number: usize, samples: usize, every: usize) -> Counts {
+    let mut pcg = Pcg32::new(number as u64, 15);
+    let scene = random_scene(number, &mut pcg);
+    let lights = build(&scene, ARITIES[number % ARITIES.len()]);
+    let mut counts = Counts::default();
+    for point in 0..POINTS {
+        let x = shading_point(number + point, &scene, &mut pcg);
+        for i in 0..samples / POINTS {
+            // A direction leads to the same cell only where the point is not on the rim of one: plain numbers then.
+            let direction = i % every == 0 && (number + point) % 10 < 7 && !MOVED.contains(&(number % 8));
+            let u = std::array::from_fn(|_| if direction { pcg.f32() } else { hostile(&mut pcg) });
+            match lights.sample(&x, u) {
+                Some(sample) => {
+                    counts.check(&*lights, &x, &sample);
+                    if direction {
+                        counts.check_direction(&*lights, &x, &sample);
+                    }
+                }
+                None => {
+                    counts.samples += 1;
+                    counts.none += 1;
+                }
+            }
+        }
+    }
+    counts
+}
+
+fn examine_all(scenes: usize, samples: usize, every: usize) {
+    let mut all = Counts::default();
+    parallel::map(scenes, |i| examine(i, samples, every)).into_iter().for_each(|counts| all.add(counts));
+    println!(
+        "{} samples, {} of them None: {} mismatches, worst {:e}, {} not finite; {} directions: {} below the sample's \
+         density, {} found with another",
+        all.samples, all.none, all.mismatches, all.worst, all.broken, all.directions, all.below, all.boundary
+    );
+    let first = all.first.unwrap_or_default();
+    assert_eq!([all.mismatches, all.broken, all.below], [0; 3], "mismatches, not finite, below; the first: {first}");
+    assert!(all.samples - all.none > all.samples / 3, "too few samples to mean anything");
+    let rate = all.boundary as f64 / all.directions as f64;
+    assert!(rate < 1e-4, "the density of a direction differs at a rate of {rate:e}");
+}
+
+#[test]
+fn a_million_samples_have_the_density_that_pdf_finds() {
+    examine_all(200, 5000, 2);
+}
+
+#[test]
+#[ignore = "release tier: 10^8 samples take minutes; cargo test --release --test agreement -- --ignored"]
+fn a_hundred_million_samples_have_the_density_that_pdf_finds() {
+    examine_all(400, 250_000, 10);
+}
+
+#[test]
+fn a_density_of_another_cell_is_told_apart() {
+    let mut scene =
+        Scene::random(&mut Pcg32::new(3, 16), Content { triangles: 10, textured: true, sky: 0, two_sided: true });
+    scene.rotation = glam::Mat3::IDENTITY;
+    let lights = build(&scene, (8, 4));
+    let mut pcg = Pcg32::new(4, 16);
+    let x = random_point(&mut pcg, 2);
+    let mut counts = Counts::default();
+    for _ in 0..1000 {
+        let mut sample = lights.sample(&x, pcg.cube()).expect("everything is visible");
+        sample.pdf *= 1.0 + 3e-5;
+        counts.check(&*lights, &x, &sample);
+    }
+    assert_eq!(counts.mismatches, 1000);
+}
+
+#[test]
+fn split_samples_have_the_density_that_pdf_split_finds() {
+    let check = |number: usize| {
+        let mut pcg = Pcg32::new(number as u64, 17);
+        let scene = random_scene(number, &mut pcg);
+        let lights = build(&scene, ARITIES[number % ARITIES.len()]);
+        let splitting = Splitting { threshold: [0.3, 0.7, 0.95, 1.0][number % 4], levels: 1 + (number % 3) as u32 };
+        let (mut count, mut most) = (0, 0);
+        for point in 0..40 {
+            let x = shading_point(number + point, &scene, &mut pcg);
+            for _ in 0..20 {
+                let u = std::array::from_fn(|_| hostile(&mut pcg));
+                let samples = lights.sample_split(&x, u, &splitting);
+                most = most.max(samples.len());
+                for sample in samples.iter().take(50) {
+                    count += 1;
+                    let pdf = lights.pdf_split(&x, &sample.hit, &splitting);
+                    assert!(!differs(pdf, sample.pdf, TOLERANCE), "{sample:?} at {x:?} with {splitting:?}: {pdf}");
+                }
+            }
+        }
+        (count, most)
+    };
+    let found = parallel::map(60, check);
+    let most = found.iter().map(|f| f.1).max();
+    println!("{} samples, up to {most:?} of one split", found.iter().map(|f| f.0).sum::<usize>());
+    assert!(most > Some(20));
+}
+
+#[test]
+fn environment_samples_have_the_density_that_pdf_finds() {
+    for kind in 0..4 {
+        let mut pcg = Pcg32::new(kind as u64, 18);
+        let content = Content { triangles: 1, textured: false, sky: kind, two_sided: false };
+        let environment = Scene::random(&mut pcg, content).environment();
+        for _ in 0..50_000 {
+            let sample = environment.sample([hostile(&mut pcg), hostile(&mut pcg)]).expect("it is not black");
+            assert!(sample.direction.is_normalized() && sample.pdf > 0.0 && sample.pdf.is_finite());
+            assert!(!differs(environment.pdf(sample.direction), sample.pdf, TOLERANCE), "{sample:?}");
+            assert!(!differs(environment.radiance(sample.direction), sample.radiance, TOLERANCE), "{sample:?}");
+        }
+    }
+}
+
+/// The same bits from a second build, and from a sampler that went through bytes.
+#[test]
+fn samples_are_reproducible_to_the_bit() {
+    let bits = |sample: &Option<LightSample>| {
+        sample.map(|s| {
+            let [p, n, d] = [s.position, s.normal, s.direction].map(|v| v.to_array().map(f32::to_bits));
+            let scalars = [s.distance, s.pdf, s.pdf_area, s.pmf].map(f32::to_bits);
+            (s.hit.triangle, s.hit.barycentrics.map(f32::to_bits), p, n, d, scalars)
+        })
+    };
+    for number in 0..40 {
+        let mut pcg = Pcg32::new(number as u64, 19);
+        let scene = random_scene(number, &mut pcg);
+        let arities = ARITIES[number % ARITIES.len()];
+        let queries: Vec<_> = (0..500)
+            .map(|i| (shading_point(i, &scene, &mut pcg), std::array::from_fn(|_| hostile(&mut pcg))))
+            .collect();
+        let (first, second) = (build(&scene, arities), build(&scene, arities));
+        assert_eq!(first.to_bytes(), second.to_bytes());
+        let loaded = first.sample_from_bytes(&queries);
+        let mut some = 0;
+        for ((x, u), loaded) in queries.iter().zip(&loaded) {
+            let sample = bits(&first.sample(x, *u));
+            assert_eq!(sample, bits(&second.sample(x, *u)));
+            assert_eq!(sample, bits(loaded));
+            some += usize::from(sample.is_some());
+        }
+        assert!(some > 0, "{}", scene.name);
+    }
+}
+
+/// Two openings behind each other: the density of a direction is the sum over both, and more than either.
+#[test]
+fn the_density_of_a_direction_counts_every_portal() {
+    let outer = LightMesh::quad(Vec3::new(-2.0, -2.0, 2.0), 4.0 * Vec3::Y, 4.0 * Vec3::X).portal();
+    let inner = LightMesh::quad(Vec3::new(-0.5, -0.5, 1.0), Vec3::Y, Vec3::X).portal().paint(Paint::Constant(0.5));
+    let lights = build(&Scene::new("nested", vec![outer, inner]), (8, 4));
+    let mut pcg = Pcg32::new(1, 20);
+    let x = ShadingPoint { position: Vec3::new(0.1, -0.1, 0.0), receiver: Receiver::Surface(Vec3::Z) };
+    let (mut both, mut one) = (0, 0);
+    for _ in 0..10_000 {
+        let sample = lights.sample(&x, pcg.cube()).expect("both are above the horizon");
+        let along = lights.pdf_sample_direction(&x, &sample);
+        if along > sample.pdf { both += 1 } else { one += 1 }
+    }
+    assert!(both > 1000 && one > 1000, "{both} {one}");
+}
