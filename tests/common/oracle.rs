@@ -1,1 +1,216 @@
+//! Irradiance in double precision, from a scene's description alone.
 
+use fanlight::{Filter, Receiver, ShadingPoint, Wrap};
+use glam::{DVec2, DVec3};
+
+use super::scene::{Image, LightMesh, Paint, Scene, Sky};
+
+/// The generalised golden ratio in two dimensions: multiples of its inverse powers fill the square evenly.
+const GOLDEN: f64 = 1.324_717_957_244_746;
+
+/// Cosine weight of a unit direction.
+pub(crate) fn cosine(receiver: &Receiver, direction: DVec3) -> f64 {
+    match *receiver {
+        Receiver::Surface(normal) => normal.as_dvec3().dot(direction).max(0.0),
+        Receiver::Transmissive(normal) => normal.as_dvec3().dot(direction).abs(),
+        Receiver::Volume => 1.0,
+    }
+}
+
+fn wrapped(wrap: Wrap, index: i64, n: usize) -> usize {
+    let n = n as i64;
+    let index = match wrap {
+        Wrap::Repeat => index.rem_euclid(n),
+        Wrap::Clamp => index.clamp(0, n - 1),
+        Wrap::Mirror if index.div_euclid(n) % 2 == 0 => index.rem_euclid(n),
+        Wrap::Mirror => n - 1 - index.rem_euclid(n),
+    };
+    index as usize
+}
+
+fn look_up(image: &Image, uv: DVec2) -> f64 {
+    let [w, h] = image.size;
+    let fetch =
+        |i: i64, j: i64| f64::from(image.texels[wrapped(image.wrap[1], j, h) * w + wrapped(image.wrap[0], i, w)]);
+    let (x, y) = (uv.x * w as f64, uv.y * h as f64);
+    match image.filter {
+        Filter::Nearest => fetch(x.floor() as i64, y.floor() as i64),
+        Filter::Bilinear => {
+            let (x, y) = (x - 0.5, y - 0.5);
+            let (i, j) = (x.floor() as i64, y.floor() as i64);
+            let (fx, fy) = (x - x.floor(), y - y.floor());
+            (fetch(i, j) * (1.0 - fx) + fetch(i + 1, j) * fx) * (1.0 - fy)
+                + (fetch(i, j + 1) * (1.0 - fx) + fetch(i + 1, j + 1) * fx) * fy
+        }
+    }
+}
+
+/// Weight of a mesh at a point of one of its triangles.
+pub(crate) fn weight(scene: &Scene, mesh: &LightMesh, triangle: usize, [b1, b2]: [f64; 2]) -> f64 {
+    match mesh.paint {
+        Paint::Constant(value) => f64::from(value),
+        Paint::Image(image) => {
+            let [a, b, c] = mesh.corner_uvs(triangle).map(|uv| uv.as_dvec2());
+            look_up(&scene.images[image], a * (1.0 - b1 - b2) + b * b1 + c * b2)
+        }
+    }
+}
+
+/// Radiance of the environment along a unit direction, from the source image.
+pub(crate) fn radiance(scene: &Scene, direction: DVec3) -> f64 {
+    match &scene.sky {
+        Sky::Constant(radiance) => f64::from(*radiance),
+        Sky::LatLong { size: [w, h], texels } => {
+            let local = scene.rotation.as_dmat3().transpose() * direction;
+            let turns = (-local.y).atan2(local.x) / std::f64::consts::TAU;
+            let u = turns - turns.floor();
+            let v = local.z.clamp(-1.0, 1.0).acos() / std::f64::consts::PI;
+            let (i, j) = ((u * *w as f64) as usize, (v * *h as f64) as usize);
+            f64::from(texels[j.min(h - 1) * w + i.min(w - 1)])
+        }
+    }
+}
+
+/// Where a ray from the origin crosses a triangle with these vertices.
+fn intersect([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<[f64; 2]> {
+    let normal = (b - a).cross(c - a);
+    let t = normal.dot(a) / normal.dot(direction);
+    if !(t > 0.0 && t.is_finite()) {
+        return None;
+    }
+    let p = direction * t;
+    let area2 = normal.length_squared();
+    let b1 = normal.dot((c - a).cross(a - p)) / area2;
+    let b2 = normal.dot((a - p).cross(b - a)) / area2;
+    // Signed areas of the parts next to p.
+    (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0).then_some([b1, b2])
+}
+
+/// Whether light leaves a triangle, at this place relative to the shading point, towards it.
+fn sends([a, b, c]: [DVec3; 3], mesh: &LightMesh) -> bool {
+    mesh.two_sided || (b - a).cross(c - a).dot(a) < 0.0
+}
+
+fn relative(mesh: &LightMesh, triangle: usize, x: &ShadingPoint) -> [DVec3; 3] {
+    mesh.vertices(triangle).map(|v| v.as_dvec3() - x.position.as_dvec3())
+}
+
+/// Radiance that arrives along a direction through all portals that it crosses: the sky times their transmittances.
+/// A direction through no portal is dark.
+pub(crate) fn through_portals(scene: &Scene, x: &ShadingPoint, direction: DVec3) -> f64 {
+    let mut transmittance = None;
+    for mesh in scene.meshes.iter().filter(|mesh| mesh.portal) {
+        for triangle in 0..mesh.indices.len() {
+            let vertices = relative(mesh, triangle, x);
+            if let Some(b) = intersect(vertices, direction).filter(|_| sends(vertices, mesh)) {
+                *transmittance.get_or_insert(1.0) *= weight(scene, mesh, triangle, b);
+                break;
+            }
+        }
+    }
+    transmittance.map_or(0.0, |transmittance| transmittance * radiance(scene, direction))
+}
+
+/// Even points of the unit square.
+fn even_points(count: usize) -> impl Iterator<Item = [f64; 2]> {
+    let steps = [1.0 / GOLDEN, 1.0 / (GOLDEN * GOLDEN)];
+    (0..count).map(move |i| steps.map(|step| (0.5 + step * i as f64).fract()))
+}
+
+/// Integral over the triangles of the lights, or of one mesh, of what `along` says that arrives from a direction times
+/// the cosine at the shading point, with `count` points in all. `along` gets mesh, triangle, barycentrics, direction.
+pub(crate) fn over_lights(
+    scene: &Scene,
+    x: &ShadingPoint,
+    only: Option<usize>,
+    count: usize,
+    along: &dyn Fn(usize, usize, [f64; 2], DVec3) -> f64,
+) -> f64 {
+    let triangles: Vec<_> = scene.triangles().filter(|(m, _)| only.is_none_or(|only| only == *m)).collect();
+    let count = count.div_ceil(triangles.len());
+    let mut total = 0.0;
+    for (m, triangle) in triangles {
+        let vertices = relative(&scene.meshes[m], triangle, x);
+        if !sends(vertices, &scene.meshes[m]) {
+            continue;
+        }
+        let [a, b, c] = vertices;
+        let cross = (b - a).cross(c - a);
+        let mut sum = 0.0;
+        for [u, v] in even_points(count) {
+            let [b1, b2] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+            let p = a + (b - a) * b1 + (c - a) * b2;
+            let d2 = p.length_squared();
+            let direction = p / d2.sqrt();
+            let cos = cosine(&x.receiver, direction);
+            if cos > 0.0 {
+                sum += cos * along(m, triangle, [b1, b2], direction) * 0.5 * cross.dot(direction).abs() / d2;
+            }
+        }
+        total += sum / count as f64;
+    }
+    total
+}
+
+/// What a point of a light sends: its weight, of a portal times the sky behind it.
+pub(crate) fn sent(scene: &Scene, mesh: usize, triangle: usize, b: [f64; 2], direction: DVec3) -> f64 {
+    let sky = if scene.meshes[mesh].portal { radiance(scene, direction) } else { 1.0 };
+    sky * weight(scene, &scene.meshes[mesh], triangle, b)
+}
+
+/// Integral over the directions to all lit pixels of the sky of what `along` says that arrives times the cosine at
+/// the shading point, with `count` points in all.
+pub(crate) fn over_pixels(scene: &Scene, x: &ShadingPoint, count: usize, along: &dyn Fn(DVec3) -> f64) -> f64 {
+    let Sky::LatLong { size: [w, h], texels } = &scene.sky else { panic!("the sky has no pixels") };
+    let lit = texels.iter().filter(|value| **value > 0.0).count();
+    let (w, count) = (*w, count.div_ceil(lit));
+    let pi = std::f64::consts::PI;
+    let mut total = 0.0;
+    for (pixel, _) in texels.iter().enumerate().filter(|(_, value)| **value > 0.0) {
+        let (i, j) = ((pixel % w) as f64, (pixel / w) as f64);
+        let (top, bottom) = ((pi * j / *h as f64).cos(), (pi * (j + 1.0) / *h as f64).cos());
+        let mut sum = 0.0;
+        for [u, v] in even_points(count) {
+            let z = top + (bottom - top) * v;
+            let (sin, cos) = (2.0 * pi * (i + u) / w as f64).sin_cos();
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            let direction = scene.rotation.as_dmat3() * DVec3::new(r * cos, -r * sin, z);
+            let cos = cosine(&x.receiver, direction);
+            if cos > 0.0 {
+                sum += cos * along(direction);
+            }
+        }
+        total += sum / count as f64 * (top - bottom) * 2.0 * pi / w as f64;
+    }
+    total
+}
+
+/// What plain lights bring along a direction: each portal that it crosses counts, one by one.
+pub(crate) fn sum_of_portals(scene: &Scene, x: &ShadingPoint, direction: DVec3) -> f64 {
+    let mut sum = 0.0;
+    for (m, triangle) in scene.triangles() {
+        let mesh = &scene.meshes[m];
+        let vertices = relative(mesh, triangle, x);
+        if let Some(b) = intersect(vertices, direction).filter(|_| mesh.portal && sends(vertices, mesh)) {
+            sum += weight(scene, mesh, triangle, b);
+        }
+    }
+    sum * radiance(scene, direction)
+}
+
+/// Doubles the number of points until the result changes by less than `tolerance`, relatively. Returns it with its
+/// last change.
+pub(crate) fn converged(tolerance: f64, integral: impl Fn(usize) -> f64) -> (f64, f64) {
+    let mut count = 1 << 15;
+    let mut before = integral(count);
+    loop {
+        count *= 2;
+        let now = integral(count);
+        let change = (now - before).abs();
+        // The sequence is even, but one doubling may agree by chance: none counts before the third.
+        if (change <= tolerance * now && count >= 1 << 18) || count >= 1 << 24 {
+            return (now, change);
+        }
+        before = now;
+    }
+}
