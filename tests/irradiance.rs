@@ -130,6 +130,7 @@ fn check(case: &Case) -> Vec<Found> {
         100.0 * errors[errors.len() * 9 / 10],
         100.0 * change
     );
+    assert!(found.iter().all(|f| f.exact > 0.0 || f.mean == 0.0), "{}: light where there is none", case.name);
     assert!(lit.len() * 2 > POINTS, "{}: {} lit points", case.name, lit.len());
     assert!(change <= 1e-3, "{}: the integral is off by {change}", case.name);
     assert!(errors[errors.len() * 3 / 4] < 0.02, "{}: {errors:?}", case.name);

@@ -126,19 +126,26 @@ pub(crate) fn over_lights(
     count: usize,
     along: &dyn Fn(usize, usize, [f64; 2], DVec3) -> f64,
 ) -> f64 {
-    let triangles: Vec<_> = scene.triangles().filter(|(m, _)| only.is_none_or(|only| only == *m)).collect();
-    let count = count.div_ceil(triangles.len());
-    let mut total = 0.0;
-    for (m, triangle) in triangles {
+    let mut parts = Vec::new();
+    for (m, triangle) in scene.triangles().filter(|(m, _)| only.is_none_or(|only| only == *m)) {
         let vertices = relative(&scene.meshes[m], triangle, x);
-        if !sends(vertices, &scene.meshes[m]) {
-            continue;
+        if sends(vertices, &scene.meshes[m]) {
+            let whole = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+            cut(&x.receiver, vertices, whole, 0, &mut |corners| parts.push((m, triangle, corners)));
         }
-        let [a, b, c] = vertices;
+    }
+    let count = count.div_ceil(parts.len().max(1));
+    let mut total = 0.0;
+    for (m, triangle, [o, p1, p2]) in parts {
+        let [a, b, c] = relative(&scene.meshes[m], triangle, x);
         let cross = (b - a).cross(c - a);
+        // The square of the ratio of an edge to the whole triangle's.
+        let share = ((p1[0] - o[0]) * (p2[1] - o[1]) - (p1[1] - o[1]) * (p2[0] - o[0])).abs();
         let mut sum = 0.0;
         for [u, v] in even_points(count) {
-            let [b1, b2] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+            // Heitz's map, which is continuous.
+            let [s, t] = if v > u { [0.5 * u, v - 0.5 * u] } else { [u - 0.5 * v, 0.5 * v] };
+            let [b1, b2] = [0, 1].map(|i| o[i] + (p1[i] - o[i]) * s + (p2[i] - o[i]) * t);
             let p = a + (b - a) * b1 + (c - a) * b2;
             let d2 = p.length_squared();
             let direction = p / d2.sqrt();
@@ -147,9 +154,41 @@ pub(crate) fn over_lights(
                 sum += cos * along(m, triangle, [b1, b2], direction) * 0.5 * cross.dot(direction).abs() / d2;
             }
         }
-        total += sum / count as f64;
+        total += share * sum / count as f64;
     }
     total
+}
+
+/// Cuts a triangle into parts that are small against their distance, given by their barycentric corners, and leaves
+/// out those below the horizon. What the horizon crosses is cut further, as so little of it may count.
+fn cut(
+    receiver: &Receiver,
+    vertices: [DVec3; 3],
+    corners: [[f64; 2]; 3],
+    depth: u32,
+    visit: &mut impl FnMut([[f64; 2]; 3]),
+) {
+    let [a, b, c] = vertices;
+    let mut above = 3;
+    if let Receiver::Surface(normal) = *receiver {
+        above = vertices.iter().filter(|v| normal.as_dvec3().dot(**v) > 0.0).count();
+    }
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let is_near = depth < 9 && longest >= (a + b + c).length() / 3.0;
+    match above {
+        0 => return,
+        3 if !is_near => return visit(corners),
+        1 | 2 if !is_near && depth >= 6 => return visit(corners),
+        _ => {}
+    }
+    let [p, q, r] = corners;
+    let half = |p: [f64; 2], q: [f64; 2]| [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
+    let (pq, qr, rp) = (half(p, q), half(q, r), half(r, p));
+    cut(receiver, [a, ab, ca], [p, pq, rp], depth + 1, visit);
+    cut(receiver, [ab, b, bc], [pq, q, qr], depth + 1, visit);
+    cut(receiver, [ca, bc, c], [rp, qr, r], depth + 1, visit);
+    cut(receiver, [bc, ca, ab], [qr, rp, pq], depth + 1, visit);
 }
 
 /// What a point of a light sends: its weight, of a portal times the sky behind it.
