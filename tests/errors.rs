@@ -3,7 +3,8 @@
 #[expect(dead_code, reason = "every test uses a part of what they share")]
 mod common;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use core::panic::AssertUnwindSafe;
+use std::panic::catch_unwind;
 
 use common::lights::{ARITIES, aligned, build};
 use common::pcg::Pcg32;
@@ -23,7 +24,7 @@ fn assert_error<T>(what: &str, result: Result<T, Error>, parts: &[&str]) {
         assert!(message.contains(part), "{what}: \"{message}\" does not say \"{part}\"");
     }
     // It is an error like others.
-    let _: &dyn std::error::Error = &error;
+    let _: &dyn core::error::Error = &error;
 }
 
 #[test]
@@ -180,7 +181,7 @@ fn exercise(view: &View<'_>, x: &ShadingPoint, u: [f32; 3]) {
     let finite = |pdf: f32| assert!(pdf.is_finite() && pdf >= 0.0, "a density of {pdf} at {x:?} with {u:?}");
     let splitting = Splitting { threshold: 0.8, levels: 2 };
     let check = |sample: &LightSample| {
-        [sample.pdf, sample.pdf_area, sample.pmf].map(finite);
+        [sample.pdf, sample.pdf_area, sample.pmf].into_iter().for_each(finite);
         assert!(sample.pdf > 0.0 && sample.pdf_area > 0.0 && sample.pmf > 0.0, "{sample:?}");
         finite(view.pdf(x, &sample.hit));
         finite(view.pdf_split(x, &sample.hit, &splitting));
@@ -239,7 +240,7 @@ fn bytes_with_a_flipped_bit() {
     let (_, lights) = full();
     let mut words = aligned(&lights.to_bytes());
     let mut pcg = Pcg32::new(5, 25);
-    let points: [ShadingPoint; 6] = std::array::from_fn(|i| common::scene::random_point(&mut pcg, i));
+    let points: [ShadingPoint; 6] = core::array::from_fn(|i| common::scene::random_point(&mut pcg, i));
     let (mut refused, mut accepted) = (0, 0);
     let mut failed = Vec::new();
     for word in 0..words.len() {
@@ -294,7 +295,8 @@ fn hostile_shading_points_and_numbers() {
             let receivers = normals.into_iter().flat_map(|n| [Receiver::Surface(n), Receiver::Transmissive(n)]);
             for receiver in receivers.chain([Receiver::Volume]) {
                 let x = ShadingPoint { position, receiver };
-                let u = if pcg.below(2) == 0 { pcg.cube() } else { std::array::from_fn(|_| bad[pcg.below(bad.len())]) };
+                let u =
+                    if pcg.below(2) == 0 { pcg.cube() } else { core::array::from_fn(|_| bad[pcg.below(bad.len())]) };
                 let result = catch_unwind(AssertUnwindSafe(|| exercise(&view, &x, u)));
                 assert!(result.is_ok(), "{x:?} with {u:?} in {}", scene.name);
                 count += 1;

@@ -71,13 +71,9 @@ fn words(chars: &[char], word: &str) -> Vec<usize> {
 
 /// The first names after a `::`, each with its place: one, or those of a group, however nested or broken into lines.
 fn first_names(chars: &[char], mut at: usize, names: &mut Vec<(usize, String)>) {
-    let skip = |mut at: usize| {
-        while chars.get(at).is_some_and(|c| c.is_whitespace()) {
-            at += 1;
-        }
-        at
-    };
-    at = skip(at);
+    while chars.get(at).is_some_and(|c| c.is_whitespace()) {
+        at += 1;
+    }
     if chars.get(at) != Some(&'{') {
         let name: String = chars[at..].iter().take_while(|c| is_word(**c) || **c == '*').collect();
         names.push((at, name));

@@ -11,6 +11,7 @@ use common::pcg::Pcg32;
 use common::scene::{Content, Scene, random_point};
 use common::statistics::{binomial_p, sidak};
 use fanlight::{Hit, LightSample, ShadingPoint};
+use glam::Vec3;
 
 /// Error granted to an integral.
 const TOLERANCE: f64 = 1e-4;
@@ -59,11 +60,25 @@ fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[Lig
 }
 
 fn examine(content: Content, number: usize, receiver: usize, count: usize, wrong: bool) -> Found {
+    examine_moved(content, number, receiver, count, wrong, &|p| p)
+}
+
+/// [`examine`] with all positions changed.
+fn examine_moved(
+    content: Content,
+    number: usize,
+    receiver: usize,
+    count: usize,
+    wrong: bool,
+    change: &dyn Fn(Vec3) -> Vec3,
+) -> Found {
     let mut pcg = Pcg32::new(100 + number as u64, 11);
-    let scene = Scene::random(&mut pcg, content);
+    let mut scene = Scene::random(&mut pcg, content);
+    scene.meshes.iter_mut().for_each(|mesh| mesh.positions.iter_mut().for_each(|p| *p = change(*p)));
     let arities = ARITIES[number % ARITIES.len()];
     let lights = build(&scene, arities);
-    let x = random_point(&mut pcg, receiver);
+    let mut x = random_point(&mut pcg, receiver);
+    x.position = change(x.position);
     let samples: Vec<_> = (0..count).filter_map(|_| lights.sample(&x, pcg.cube())).collect();
     let probing = &samples[..samples.len().min(2000)];
     let integral = integral(&scene, &*lights, &x, probing, wrong);
@@ -96,6 +111,30 @@ fn where_all_is_visible_the_density_integrates_to_one() {
         assert!((found.integral - 1.0).abs() < TOLERANCE, "{}: {}", found.name, found.integral);
     }
     println!("{} scenes, largest deviation {worst:e}", found.len());
+}
+
+/// The same far from the origin, tiny, huge, and squeezed to slivers.
+#[test]
+fn the_density_integrates_to_one_at_any_scale() {
+    let changes: [&(dyn Fn(Vec3) -> Vec3 + Sync); 6] = [
+        &|p| p + Vec3::new(1000.0, -2000.0, 500.0),
+        &|p| p * 1e-6,
+        &|p| p * 1e6,
+        &|p| p * Vec3::new(1.0, 1.0, 1e-3),
+        &|p| p * Vec3::new(1.0, 1e-4, 1e-4),
+        &|p| p * 1e-2 + 1000.0,
+    ];
+    let count = 8 * changes.len();
+    let found = parallel::map(count, |i| {
+        let triangles = [1, 10][i % 2];
+        let content = Content { triangles, textured: i % 4 > 1, sky: i % 8 / 4, two_sided: true };
+        examine_moved(content, 2000 + i, 2, 5000, false, changes[i / 8])
+    });
+    // Where a triangle is not seen edge-on, which squeezed ones are.
+    for found in &found {
+        let deviation = (found.integral + found.missed as f64 / found.samples as f64 - 1.0).abs();
+        assert!(deviation < TOLERANCE, "{}: {}, missed {}", found.name, found.integral, found.missed);
+    }
 }
 
 /// Everywhere else the shortfall is the rate of `None`. Each scene's binomial test has Šidák's share of 1 %.

@@ -67,7 +67,7 @@ struct Walk<'a, 'b> {
 
 impl Walk<'_, '_> {
     fn visit(&mut self, corners: [[f64; 2]; 3], depth: u32, bin: usize, probes: Vec<([f64; 2], f64)>) {
-        let quarters: [_; 4] = std::array::from_fn(|i| quarter(corners, i));
+        let quarters: [_; 4] = core::array::from_fn(|i| quarter(corners, i));
         if depth >= self.least_depth {
             let values = quarters.map(|q| self.on.density(middle(q)));
             let all = || values.iter().copied().chain(probes.iter().map(|p| p.1));
@@ -91,7 +91,7 @@ impl Walk<'_, '_> {
 }
 
 fn middle([a, b, c]: [[f64; 2]; 3]) -> [f64; 2] {
-    std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0)
+    core::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0)
 }
 
 /// One of the four similar parts of a barycentric triangle. The last one is the inverted one in the middle.

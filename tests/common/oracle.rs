@@ -62,9 +62,9 @@ pub(crate) fn radiance(scene: &Scene, direction: DVec3) -> f64 {
         Sky::Constant(radiance) => f64::from(*radiance),
         Sky::LatLong { size: [w, h], texels } => {
             let local = scene.rotation.as_dmat3().transpose() * direction;
-            let turns = (-local.y).atan2(local.x) / std::f64::consts::TAU;
+            let turns = (-local.y).atan2(local.x) / core::f64::consts::TAU;
             let u = turns - turns.floor();
-            let v = local.z.clamp(-1.0, 1.0).acos() / std::f64::consts::PI;
+            let v = local.z.clamp(-1.0, 1.0).acos() / core::f64::consts::PI;
             let (i, j) = ((u * *w as f64) as usize, (v * *h as f64) as usize);
             f64::from(texels[j.min(h - 1) * w + i.min(w - 1)])
         }
@@ -203,7 +203,7 @@ pub(crate) fn over_pixels(scene: &Scene, x: &ShadingPoint, count: usize, along: 
     let Sky::LatLong { size: [w, h], texels } = &scene.sky else { panic!("the sky has no pixels") };
     let lit = texels.iter().filter(|value| **value > 0.0).count();
     let (w, count) = (*w, count.div_ceil(lit));
-    let pi = std::f64::consts::PI;
+    let pi = core::f64::consts::PI;
     let mut total = 0.0;
     for (pixel, _) in texels.iter().enumerate().filter(|(_, value)| **value > 0.0) {
         let (i, j) = ((pixel % w) as f64, (pixel / w) as f64);

@@ -1,6 +1,6 @@
 //! Work on all cores, in an order that does not matter.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use core::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// `work(0..count)` in the order of the numbers.

@@ -52,7 +52,7 @@ impl Pcg32 {
     /// Uniform on the unit sphere.
     pub(crate) fn direction(&mut self) -> Vec3 {
         let z = 1.0 - 2.0 * self.f32();
-        let (sin, cos) = (std::f32::consts::TAU * self.f32()).sin_cos();
+        let (sin, cos) = (core::f32::consts::TAU * self.f32()).sin_cos();
         let radius = (1.0 - z * z).max(0.0).sqrt();
         Vec3::new(radius * cos, radius * sin, z).normalize()
     }
@@ -60,6 +60,6 @@ impl Pcg32 {
     /// Some rotation.
     pub(crate) fn rotation(&mut self) -> Mat3 {
         let axis = self.direction();
-        Mat3::from_axis_angle(axis, self.within(0.0, std::f32::consts::TAU))
+        Mat3::from_axis_angle(axis, self.within(0.0, core::f32::consts::TAU))
     }
 }

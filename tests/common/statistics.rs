@@ -1,6 +1,6 @@
 //! The statistics that judge a sampler.
 
-use std::fmt::Write;
+use core::fmt::Write;
 
 /// Significance of each of `count` tests so that all together have the significance `alpha` (Šidák).
 pub(crate) fn sidak(alpha: f64, count: usize) -> f64 {
@@ -23,7 +23,7 @@ fn ln_gamma(x: f64) -> f64 {
     let x = x - 1.0;
     let t = x + 7.5;
     let sum = C.iter().enumerate().skip(1).fold(C[0], |sum, (i, c)| sum + c / (x + i as f64));
-    0.5 * std::f64::consts::TAU.ln() + (x + 0.5) * t.ln() - t + sum.ln()
+    0.5 * core::f64::consts::TAU.ln() + (x + 0.5) * t.ln() - t + sum.ln()
 }
 
 /// Regularised upper incomplete gamma function Q(a, x).
