@@ -130,7 +130,6 @@ fn the_density_integrates_to_one_at_any_scale() {
         let content = Content { triangles, textured: i % 4 > 1, sky: i % 8 / 4, two_sided: true };
         examine_moved(content, 2000 + i, 2, 5000, false, changes[i / 8])
     });
-    // Where a triangle is not seen edge-on, which squeezed ones are.
     for found in &found {
         let deviation = (found.integral + found.missed as f64 / found.samples as f64 - 1.0).abs();
         assert!(deviation < TOLERANCE, "{}: {}, missed {}", found.name, found.integral, found.missed);
