@@ -2,6 +2,8 @@
 
 use core::f32::consts::{FRAC_PI_2, PI};
 
+use glam::Vec3;
+
 use crate::geometry::{Aabb, Cone};
 use crate::math;
 
@@ -56,5 +58,36 @@ impl LightBounds {
     /// What a cluster costs in the surface area orientation heuristic: `M_A · M_Ω · energy`.
     pub(crate) fn cost(&self, pad: f32) -> f32 {
         self.aabb.padded_area(pad) * self.orientation_measure() * self.energy()
+    }
+}
+
+/// How the energy of a cluster is spread: what a light tree estimates irradiance from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Moments {
+    /// All that the cluster sends.
+    pub(crate) energy: f32,
+    /// Mean position, by energy.
+    pub(crate) mean: Vec3,
+    /// Mean squared distance from the mean position.
+    pub(crate) variance: f32,
+    /// Mean unit normal; the shorter it is, the more the normals differ.
+    pub(crate) normal: Vec3,
+}
+
+impl Moments {
+    /// Moments of both clusters together. `flip` turns the normals of the second around first.
+    pub(crate) fn union(self, other: Self, flip: bool) -> Self {
+        let energy = self.energy + other.energy;
+        let share = if energy > 0.0 { other.energy / energy } else { 0.5 };
+        let between = other.mean - self.mean;
+        let normal = if flip { -other.normal } else { other.normal };
+        Self {
+            energy,
+            mean: self.mean + share * between,
+            variance: self.variance * (1.0 - share)
+                + other.variance * share
+                + share * (1.0 - share) * between.length_squared(),
+            normal: self.normal.lerp(normal, share),
+        }
     }
 }

@@ -24,6 +24,9 @@ use glam::Vec3;
 /// look-up is right, it costs its share of the samples.
 const DEFENSIVE: f32 = 0.02;
 
+/// Ratio of least to largest radiance from which a region counts as even.
+const EVEN: f32 = 0.75;
+
 /// Slack of the box for the rounding of the map (2.5e-7 at worst), of the rotation and of the direction.
 const ROUNDING: f32 = 1e-6;
 
@@ -55,8 +58,8 @@ impl Footprint {
 pub(crate) struct Average {
     /// Estimate of the mean radiance. Zero only if the whole region is black.
     pub(crate) value: f32,
-    /// Whether the whole region is known to have the radiance `value`.
-    pub(crate) constant: bool,
+    /// Whether the region is known to have no contrast worth a closer look: none at all, or at most that of 3 to 4.
+    pub(crate) even: bool,
 }
 
 /// What is known of a region by a few texels that hold it.
@@ -71,12 +74,12 @@ impl EnvironmentView<'_> {
     #[inline]
     pub(crate) fn average(&self, region: &Footprint) -> Average {
         if self.is_constant() {
-            return Average { value: self.header.mean, constant: true };
+            return Average { value: self.header.mean, even: true };
         }
         let center = sphere_to_square(to_local(&self.header.rotation, region.direction));
         let cover = self.cover(center.x, center.y, region.sin_radius);
         if cover.min == cover.max {
-            return Average { value: cover.max, constant: true };
+            return Average { value: cover.max, even: true };
         }
         let depth = self.depth_of_solid_angle(region.solid_angle);
         let scale = (1_u32 << depth) as f32;
@@ -84,7 +87,7 @@ impl EnvironmentView<'_> {
         let (x, y) = (((center.x * scale) as u32).min(last), ((center.y * scale) as u32).min(last));
         let talk = self.filtered[level_start(depth) + ((y << depth) | x) as usize];
         let value = (1.0 - DEFENSIVE) * talk + DEFENSIVE * cover.mean;
-        Average { value: value.max(f32::MIN_POSITIVE), constant: false }
+        Average { value: value.max(f32::MIN_POSITIVE), even: cover.min >= EVEN * cover.max }
     }
 
     /// Mean, minimum and maximum over texels that hold a cone around a point of the square.

@@ -24,6 +24,13 @@ impl Triangle {
         (area > 0.0 && area.is_finite()).then(|| ((cross / double_area).as_vec3(), area))
     }
 
+    /// Mean position, and mean squared distance from it.
+    pub(crate) fn mean_and_variance(&self) -> (Vec3, f32) {
+        let [a, b, c] = self.0;
+        let edges = (b - a).length_squared() + (c - b).length_squared() + (a - c).length_squared();
+        (a + ((b - a) + (c - a)) * (1.0 / 3.0), edges * (1.0 / 36.0))
+    }
+
     /// Height of a point over the triangle's plane, positive on the front side, with a sign that can be trusted.
     pub(crate) fn height(&self, point: Vec3) -> f64 {
         let cross = self.double_area_vector();

@@ -12,6 +12,9 @@ use crate::record::{Receiver, ShadingPoint, TriangleId};
 /// Largest coordinate of a vertex: squares of squares of distances must not overflow where the tree is built.
 pub(crate) const POSITION_LIMIT: f32 = 1e9;
 
+/// Ratio of squared radius to squared distance up to which the geometry is taken for the same all over a cell.
+const FAR: f32 = 1.0 / 16.0;
+
 /// What is kept of every triangle that can send light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -130,20 +133,6 @@ impl<'a> Lit<'a> {
         let pdf = pdf_area * distance2 * crate::math::sqrt64(distance2) / f64::from(self.height);
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
-
-    /// The directions in which a cell is seen.
-    #[inline]
-    fn footprint(&self, cell: &Cell, area: f32) -> Footprint {
-        let center = cell.center();
-        let distance2 = center.length_squared().max(self.height * self.height).max(f32::MIN_POSITIVE);
-        let inverse = 1.0 / crate::math::sqrt(distance2);
-        let radius2 = cell.vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
-        Footprint {
-            direction: center * inverse,
-            sin_radius: crate::math::sqrt(radius2) * inverse,
-            solid_angle: area * self.height * inverse * inverse * inverse,
-        }
-    }
 }
 
 impl Shape for Lit<'_> {
@@ -151,14 +140,32 @@ impl Shape for Lit<'_> {
     fn worth(&self, cell: &Cell) -> Worth {
         let area = self.area * cell.share();
         let weight = self.illumination.estimate(&self.receiver, &cell.vertices, area, self.height);
+        if weight == 0.0 {
+            return Worth { weight, uniform: true };
+        }
+        let center = cell.center();
+        let distance2 = center.length_squared().max(self.height * self.height).max(f32::MIN_POSITIVE);
+        let radius2 = cell.vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
+        let far = radius2 <= FAR * distance2;
         match self.environment {
-            Some(environment) if weight > 0.0 => {
-                let footprint = self.footprint(cell, area);
+            Some(environment) => {
+                let footprint = footprint(center, distance2, radius2, area * self.height);
                 let seen = environment.average(&footprint);
                 let one_texel = footprint.sin_radius < 1.0 && footprint.solid_angle <= environment.texel_solid_angle();
-                Worth { weight: weight * seen.value, uniform: seen.constant || one_texel }
+                Worth { weight: weight * seen.value, uniform: one_texel || (seen.even && far) }
             }
-            _ => Worth { weight, uniform: true },
+            None => Worth { weight, uniform: far },
         }
+    }
+}
+
+/// The directions in which a cell is seen.
+#[inline]
+fn footprint(center: Vec3, distance2: f32, radius2: f32, area_by_height: f32) -> Footprint {
+    let inverse = 1.0 / crate::math::sqrt(distance2);
+    Footprint {
+        direction: center * inverse,
+        sin_radius: crate::math::sqrt(radius2) * inverse,
+        solid_angle: area_by_height * inverse * inverse * inverse,
     }
 }

@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::lights::{LightSampler, NO_LEAF};
 use super::mesh::{Kind, Mesh, Sides, TextureId, Weight};
 use crate::blas::{self, Prepared, Root, Texture};
-use crate::bounds::LightBounds;
+use crate::bounds::{LightBounds, Moments};
 use crate::env::Environment;
 use crate::error::{Error, Kind as ErrorKind};
 use crate::geometry::{Aabb, Cone};
@@ -200,7 +200,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
 }
 
 /// Which triangles send anything in this environment, and the bounds of each.
-fn select(triangles: &[LightTriangle], environment: &Environment) -> (Vec<u32>, Vec<LightBounds>) {
+fn select(triangles: &[LightTriangle], environment: &Environment) -> (Vec<u32>, Vec<(LightBounds, Moments)>) {
     let mean = f64::from(environment.mean());
     let energy = |light: &LightTriangle| {
         let radiance = if light.is_portal() { mean } else { 1.0 };
@@ -214,13 +214,16 @@ fn select(triangles: &[LightTriangle], environment: &Environment) -> (Vec<u32>, 
         let share = (energy(light) / total).max(LEAST_ENERGY) as f32;
         let directional = light.is_portal() && !environment.is_constant();
         let triangle = light.triangle();
-        LightBounds {
+        let normal = triangle.normal_and_area().map_or(Vec3::Z, |(normal, _)| normal);
+        let bounds = LightBounds {
             aabb: Aabb::around(&triangle.0),
-            normals: Cone::single(triangle.normal_and_area().map_or(Vec3::Z, |(normal, _)| normal)),
+            normals: Cone::single(normal),
             flux: if directional { 0.0 } else { share },
             portal: if directional { share } else { 0.0 },
             two_sided: light.is_two_sided(),
-        }
+        };
+        let (mean, variance) = triangle.mean_and_variance();
+        (bounds, Moments { energy: share, mean, variance, normal })
     };
     let bounds = lights.iter().map(bounds).collect();
     (lights, bounds)

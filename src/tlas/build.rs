@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use super::collapse::collapse;
 use super::node::Tlas;
-use crate::bounds::LightBounds;
+use crate::bounds::{LightBounds, Moments};
 use crate::geometry::Aabb;
 
 /// Bins per axis.
@@ -25,6 +25,7 @@ const PARALLEL: usize = 4096;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BinaryNode {
     pub(super) bounds: LightBounds,
+    pub(super) moments: Moments,
     pub(super) count: u32,
     /// The number of the light in a leaf, the distance to the right child elsewhere.
     pub(super) link: u32,
@@ -34,16 +35,18 @@ pub(super) struct BinaryNode {
 #[derive(Clone, Copy)]
 struct Item {
     bounds: LightBounds,
+    moments: Moments,
     light: u32,
 }
 
 /// Builds a tree of arity `N` over lights. Returns it with the lights in the order of its leaves.
-pub(crate) fn build<const N: usize>(lights: &[LightBounds]) -> (Tlas<N>, Vec<u32>) {
-    let mut items: Vec<Item> = lights.iter().zip(0..).map(|(&bounds, light)| Item { bounds, light }).collect();
+pub(crate) fn build<const N: usize>(lights: &[(LightBounds, Moments)]) -> (Tlas<N>, Vec<u32>) {
+    let mut items: Vec<Item> =
+        lights.iter().zip(0..).map(|(&(bounds, moments), light)| Item { bounds, moments, light }).collect();
     let Some(first) = items.first() else {
         return (Tlas { nodes: Vec::new(), parents: Vec::new(), spreads: Vec::new(), leaves: Vec::new() }, Vec::new());
     };
-    let blank = BinaryNode { bounds: first.bounds, count: 1, link: 0 };
+    let blank = BinaryNode { bounds: first.bounds, moments: first.moments, count: 1, link: 0 };
     let mut binary = vec![blank; 2 * items.len() - 1];
     subdivide(&mut items, &mut binary, 0);
     collapse(&binary)
@@ -52,7 +55,7 @@ pub(crate) fn build<const N: usize>(lights: &[LightBounds]) -> (Tlas<N>, Vec<u32
 /// Builds the subtree over `items` into `nodes`, which holds exactly its `2 n - 1` places.
 fn subdivide(items: &mut [Item], nodes: &mut [BinaryNode], depth: u32) {
     if let [item] = items {
-        nodes[0] = BinaryNode { bounds: item.bounds, count: 1, link: item.light };
+        nodes[0] = BinaryNode { bounds: item.bounds, moments: item.moments, count: 1, link: item.light };
         return;
     }
     let middle = split(items, depth);
@@ -61,8 +64,11 @@ fn subdivide(items: &mut [Item], nodes: &mut [BinaryNode], depth: u32) {
     let (left, right) = below.split_at_mut(2 * middle - 1);
     let size = left.len() + right.len();
     both(|| subdivide(left_items, left, depth + 1), || subdivide(right_items, right, depth + 1), size);
+    let two_sided = left[0].bounds.two_sided && right[0].bounds.two_sided;
+    let flip = two_sided && left[0].moments.normal.dot(right[0].moments.normal) < 0.0;
     root[0] = BinaryNode {
         bounds: left[0].bounds.union(right[0].bounds),
+        moments: left[0].moments.union(right[0].moments, flip),
         count: left[0].count + right[0].count,
         link: 2 * middle as u32,
     };

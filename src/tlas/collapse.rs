@@ -31,13 +31,18 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
         tlas.parents.push(parent);
         tlas.spreads.push(energies[root]);
         if let Some((node, lane)) = parent.get::<N>() {
-            tlas.nodes[node].set(lane, Child::Node(index as u32), &binary[root].bounds);
+            tlas.nodes[node].set(lane, Child::Node(index as u32), &binary[root].bounds, &binary[root].moments);
         }
         let mut cut = [0; N];
         let width = make_cut(binary, root, &mut cut);
         for (lane, &below) in cut[..width].iter().enumerate() {
             if binary[below].count == 1 {
-                tlas.nodes[index].set(lane, Child::Leaf(lights.len() as u32), &binary[below].bounds);
+                tlas.nodes[index].set(
+                    lane,
+                    Child::Leaf(lights.len() as u32),
+                    &binary[below].bounds,
+                    &binary[below].moments,
+                );
                 tlas.leaves.push(Slot::new::<N>(index, lane));
                 lights.push(binary[below].link);
             }

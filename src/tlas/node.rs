@@ -5,7 +5,8 @@ use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::bounds::LightBounds;
+use crate::bounds::{LightBounds, Moments};
+use crate::geometry::Aabb;
 use crate::math;
 
 /// Marks a child that is a leaf; the other bits below [`TWO_SIDED`] are its number.
@@ -20,7 +21,7 @@ const EMPTY: u32 = u32::MAX;
 /// Widening of a cluster's cone of normals, in radians: covers the rounding of its construction in `f32`.
 const CONE_MARGIN: f32 = 1e-4;
 
-const ROWS: usize = 14;
+const ROWS: usize = 21;
 const CHILD: usize = 0;
 const MIN: usize = 1;
 const MAX: usize = 4;
@@ -29,6 +30,9 @@ const COS: usize = 10;
 const SIN: usize = 11;
 const FLUX: usize = 12;
 const PORTAL: usize = 13;
+const MEAN: usize = 14;
+const VARIANCE: usize = 17;
+const NORMAL: usize = 18;
 
 /// `N` children, one a lane: a row of references, then rows of `f32` bits (the talk's `TLASNode`, with the energy in
 /// two rows: one that arrives the same from everywhere, one to be multiplied by what is seen through a portal).
@@ -56,7 +60,7 @@ impl<const N: usize> Node<N> {
     }
 
     /// Writes one child and its bounds.
-    pub(super) fn set(&mut self, lane: usize, child: Child, bounds: &LightBounds) {
+    pub(super) fn set(&mut self, lane: usize, child: Child, bounds: &LightBounds, moments: &Moments) {
         let side = if bounds.two_sided { TWO_SIDED } else { 0 };
         self.0[CHILD][lane] = match child {
             Child::Empty => EMPTY,
@@ -69,7 +73,10 @@ impl<const N: usize> Node<N> {
             write(MIN + axis, bounds.aabb.min[axis]);
             write(MAX + axis, bounds.aabb.max[axis]);
             write(AXIS + axis, bounds.normals.axis[axis]);
+            write(MEAN + axis, moments.mean[axis]);
+            write(NORMAL + axis, moments.normal[axis]);
         }
+        write(VARIANCE, moments.variance);
         write(COS, cos);
         write(SIN, sin.max(0.0));
         write(FLUX, bounds.flux);
@@ -85,50 +92,69 @@ impl<const N: usize> Node<N> {
         }
     }
 
+    /// A row of floats.
+    #[inline(always)]
+    fn row(&self, row: usize) -> [f32; N] {
+        self.0[row].map(f32::from_bits)
+    }
+
+    /// Three rows of floats, one an axis.
+    #[inline(always)]
+    fn vectors(&self, row: usize) -> [[f32; N]; 3] {
+        [self.row(row), self.row(row + 1), self.row(row + 2)]
+    }
+
+    /// One for each lane that holds a two-sided light, else zero.
+    #[inline(always)]
+    pub(super) fn two_sided(&self) -> [bool; N] {
+        self.0[CHILD].map(|reference| reference & TWO_SIDED != 0)
+    }
+
+    /// Lanes that refer to a child.
+    #[inline(always)]
+    pub(super) fn occupied(&self) -> [bool; N] {
+        self.0[CHILD].map(|reference| reference != EMPTY)
+    }
+
+    /// Corners of the boxes.
+    #[inline(always)]
+    pub(super) fn boxes(&self) -> [[[f32; N]; 3]; 2] {
+        [self.vectors(MIN), self.vectors(MAX)]
+    }
+
+    /// Axes of the cones of normals, and the cosines and sines of their half angles.
+    #[inline(always)]
+    pub(super) fn cones(&self) -> ([[f32; N]; 3], [f32; N], [f32; N]) {
+        (self.vectors(AXIS), self.row(COS), self.row(SIN))
+    }
+
+    /// Mean positions, variances of the position, and mean normals.
+    #[inline(always)]
+    pub(super) fn moments(&self) -> ([[f32; N]; 3], [f32; N], [[f32; N]; 3]) {
+        (self.vectors(MEAN), self.row(VARIANCE), self.vectors(NORMAL))
+    }
+
+    /// Energies that do not depend on the direction, and those of portals.
+    #[inline(always)]
+    pub(super) fn energies(&self) -> [[f32; N]; 2] {
+        [self.row(FLUX), self.row(PORTAL)]
+    }
+
+    /// The corners of one box.
+    #[inline(always)]
+    pub(super) fn aabb(&self, lane: usize) -> Aabb {
+        let corner = |row: usize| Vec3::from_array([0, 1, 2].map(|axis| self.value(row + axis, lane)));
+        Aabb { min: corner(MIN), max: corner(MAX) }
+    }
+
     #[inline(always)]
     fn value(&self, row: usize, lane: usize) -> f32 {
         f32::from_bits(self.0[row][lane])
     }
 
-    #[inline(always)]
-    fn vector(&self, row: usize, lane: usize) -> Vec3 {
-        Vec3::new(self.value(row, lane), self.value(row + 1, lane), self.value(row + 2, lane))
-    }
-
-    #[inline(always)]
-    pub(super) fn two_sided(&self, lane: usize) -> bool {
-        self.0[CHILD][lane] & TWO_SIDED != 0
-    }
-
-    #[inline(always)]
-    pub(super) fn min(&self, lane: usize) -> Vec3 {
-        self.vector(MIN, lane)
-    }
-
-    #[inline(always)]
-    pub(super) fn max(&self, lane: usize) -> Vec3 {
-        self.vector(MAX, lane)
-    }
-
-    #[inline(always)]
-    pub(super) fn axis(&self, lane: usize) -> Vec3 {
-        self.vector(AXIS, lane)
-    }
-
-    /// Cosine and sine of the half angle of the cone of normals.
-    #[inline(always)]
-    pub(super) fn cone(&self, lane: usize) -> (f32, f32) {
-        (self.value(COS, lane), self.value(SIN, lane))
-    }
-
-    #[inline(always)]
-    pub(super) fn flux(&self, lane: usize) -> f32 {
-        self.value(FLUX, lane)
-    }
-
-    #[inline(always)]
-    pub(super) fn portal(&self, lane: usize) -> f32 {
-        self.value(PORTAL, lane)
+    /// Whether no energy of a lane is negative.
+    pub(super) fn has_energies(&self, lane: usize) -> bool {
+        self.value(FLUX, lane) >= 0.0 && self.value(PORTAL, lane) >= 0.0 && self.value(VARIANCE, lane) >= 0.0
     }
 
     /// Every value of a lane but its reference.

@@ -43,9 +43,10 @@ impl<const N: usize> Node<N> {
     #[inline(always)]
     fn is_crossed(&self, lane: usize, origin: Vec3, inverse: Vec3) -> bool {
         let (mut enter, mut leave) = (0.0f32, f32::INFINITY);
+        let aabb = self.aabb(lane);
         for axis in 0..3 {
-            let a = (self.min(lane)[axis] - origin[axis]) * inverse[axis];
-            let b = (self.max(lane)[axis] - origin[axis]) * inverse[axis];
+            let a = (aabb.min[axis] - origin[axis]) * inverse[axis];
+            let b = (aabb.max[axis] - origin[axis]) * inverse[axis];
             let (near, far) = (a.min(b), a.max(b));
             // Each end moves outwards by its own rounding; an infinite one stays where it is.
             enter = enter.max(near * if near > 0.0 { 1.0 - WIDENING } else { 1.0 + WIDENING });

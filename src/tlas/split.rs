@@ -67,10 +67,10 @@ impl<const N: usize> TlasView<'_, N> {
             }
             arriving = false;
             match self.nodes[node].child(lane) {
-                Child::Node(index) if self.nodes[node].weight(lane, x, scene) > 0.0 => {
+                Child::Node(index) if self.nodes[node].is_possible(lane, x, scene) => {
                     (node, lane, depth, arriving) = (index as usize, 0, depth + 1, true);
                 }
-                Child::Leaf(leaf) if self.nodes[node].weight(lane, x, scene) > 0.0 => {
+                Child::Leaf(leaf) if self.nodes[node].is_possible(lane, x, scene) => {
                     visit(leaf, 1.0);
                     lane += 1;
                 }
@@ -131,7 +131,8 @@ impl<const N: usize> TlasView<'_, N> {
         let node = &self.nodes[node];
         let lanes = (0..N).filter(|&lane| node.child(lane) != Child::Empty);
         let (near2, far2) = lanes.fold((f32::INFINITY, 0.0f32), |(near2, far2), lane| {
-            let (below, above) = (node.min(lane) - x.position, x.position - node.max(lane));
+            let aabb = node.aabb(lane);
+            let (below, above) = (aabb.min - x.position, x.position - aabb.max);
             let near = below.max(above).max(glam::Vec3::ZERO);
             let far = below.abs().max(above.abs());
             (near2.min(near.length_squared()), far2.max(far.length_squared()))

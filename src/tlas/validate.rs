@@ -48,7 +48,7 @@ impl<const N: usize> TlasView<'_, N> {
         if slot != Some(&here) {
             return Err(Error::bytes("parent of the child in this lane", index, lane, lane));
         }
-        if !node.values(lane).all(f32::is_finite) || node.flux(lane) < 0.0 || node.portal(lane) < 0.0 {
+        if !node.values(lane).all(f32::is_finite) || !node.has_energies(lane) {
             return Err(Error::bytes("values of this lane", index, lane, lane));
         }
         let spread = &self.spreads[index];
