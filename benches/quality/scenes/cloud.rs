@@ -19,5 +19,5 @@ pub(crate) fn cloud(count: usize) -> Scene {
         LightMesh { positions, uvs: vec![], indices: vec![[0, 1, 2]], weight, portal: false }
     };
     let meshes = (0..count).map(|_| triangle()).collect();
-    Scene::emitters(&format!("cloud-{count}"), meshes, None, PointSet::Cube)
+    Scene::emitters(meshes, None, PointSet::Cube)
 }

@@ -109,7 +109,6 @@ impl Light {
 /// A workload.
 #[derive(Clone, Debug)]
 pub(crate) struct Scene {
-    pub(crate) name: String,
     pub(crate) meshes: Vec<LightMesh>,
     /// All triangles of all meshes, in order.
     pub(crate) lights: Vec<Light>,
@@ -123,7 +122,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    fn emitters(name: &str, meshes: Vec<LightMesh>, image: Option<Image>, points: PointSet) -> Self {
+    fn emitters(meshes: Vec<LightMesh>, image: Option<Image>, points: PointSet) -> Self {
         let mut lights = vec![];
         let mut first = vec![];
         for (number, mesh) in (0..).zip(&meshes) {
@@ -136,12 +135,12 @@ impl Scene {
             };
             lights.extend((0..).zip(&mesh.indices).map(light));
         }
-        Self { name: name.to_owned(), meshes, lights, first, image, sky: None, walls: vec![], points }
+        Self { meshes, lights, first, image, sky: None, walls: vec![], points }
     }
 
-    fn portals(name: &str, walls: Vec<Wall>, image: Option<Image>) -> Self {
+    fn portals(walls: Vec<Wall>, image: Option<Image>) -> Self {
         let meshes = walls.iter().map(Wall::mesh).collect();
-        let scene = Self::emitters(name, meshes, image, PointSet::Room);
+        let scene = Self::emitters(meshes, image, PointSet::Room);
         Self { sky: Some(Sky::new()), walls, ..scene }
     }
 

@@ -12,5 +12,5 @@ pub(crate) fn quad() -> Scene {
     let positions = uvs.iter().map(|uv| Vec3::new(uv.x, uv.y, 0.0)).collect();
     let indices = vec![[0, 1, 2], [0, 2, 3]];
     let mesh = LightMesh { positions, uvs, indices, weight: Weight::Image, portal: false };
-    Scene::emitters("quad", vec![mesh], Some(Image::spots(512)), PointSet::OverQuad)
+    Scene::emitters(vec![mesh], Some(Image::spots(512)), PointSet::OverQuad)
 }

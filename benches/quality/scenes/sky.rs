@@ -27,7 +27,7 @@ impl Sky {
         let texels: Vec<f32> = (0..SIZE * SIZE)
             .map(|k| (if is_sun(direction(k)) { SUN } else { smooth(direction(k).z) }) as f32)
             .collect();
-        let environment = Environment::from_equal_area(SIZE, &texels, Filter::Nearest).expect("the sky is finite");
+        let environment = environment(&texels);
         let sun = (0..SIZE * SIZE).filter(|&k| is_sun(direction(k))).flat_map(sun_samples).collect();
         Self { texels, environment, sun }
     }
@@ -38,6 +38,11 @@ impl Sky {
         let index = |x: f64| (x as usize).min(SIZE - 1);
         f64::from(self.texels[index(at.y) * SIZE + index(at.x)])
     }
+}
+
+/// The environment with these texels.
+pub(crate) fn environment(texels: &[f32]) -> Environment {
+    Environment::from_equal_area(SIZE, texels, Filter::Nearest).expect("the sky is finite")
 }
 
 /// Radiance of the sky without the sun, by the height of a unit direction.

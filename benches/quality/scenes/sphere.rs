@@ -9,13 +9,13 @@ use super::{LightMesh, Scene, Weight};
 /// The sphere with `m` x `m` quads a face, radiance 1.
 pub(crate) fn sphere(m: u32) -> Scene {
     let mesh = mesh(m, Weight::Constant(1.0));
-    Scene::emitters(&format!("sphere-{m}"), vec![mesh], None, PointSet::AroundSphere)
+    Scene::emitters(vec![mesh], None, PointSet::AroundSphere)
 }
 
 /// The sphere under a texture of bright spots.
 pub(crate) fn sphere_with_spots(m: u32, size: usize) -> Scene {
     let mesh = mesh(m, Weight::Image);
-    Scene::emitters(&format!("sphere-{m}-spots"), vec![mesh], Some(Image::spots(size)), PointSet::AroundSphere)
+    Scene::emitters(vec![mesh], Some(Image::spots(size)), PointSet::AroundSphere)
 }
 
 fn mesh(m: u32, weight: Weight) -> LightMesh {
