@@ -11,6 +11,7 @@ mod plot;
 mod report;
 mod scenes;
 mod timing;
+mod variance;
 
 use core::num::NonZero;
 use std::process::ExitCode;
@@ -20,10 +21,11 @@ use fanlight::ShadingPoint;
 
 use args::{Args, Effort};
 use methods::Method;
-use metrics::{Measured, Selection};
+use metrics::Selection;
 use oracle::{Class, Oracle, Truth};
 use report::Row;
 use scenes::Scene;
+use variance::{Estimator, Measured};
 
 fn main() -> ExitCode {
     let args = match Args::parse() {
@@ -114,9 +116,11 @@ struct Results {
 
 impl Results {
     fn new(scene: &Scene, method: &dyn Method, points: &[(ShadingPoint, Truth)], effort: &Effort) -> Self {
-        let measure = |i: usize, (x, truth): &(ShadingPoint, Truth)| {
-            metrics::measure(scene, method, x, truth, effort.samples, i as u64)
-        };
+        let reference = scene.sky.as_ref().map(|_| methods::build("uniform-solid-angle", scene));
+        let reference = reference.as_deref().filter(|_| !method.has_own_environment());
+        let estimator = Estimator { scene, method, reference };
+        let measure =
+            |i: usize, (x, truth): &(ShadingPoint, Truth)| estimator.measure(x, truth, effort.samples, i as u64);
         let measured = if method.is_slow() { vec![] } else { parallel(points, measure) };
         // The points do not depend on the method, so that methods are compared at the same ones.
         let lights = points.first().map_or(1, |(_, truth)| truth.by_light.len());

@@ -1,23 +1,10 @@
-//! Variance of a method at many points.
+//! What variances at many points come to, and the exact variance of the choice of a triangle.
 
 use fanlight::ShadingPoint;
 
-use crate::methods::{Drawn, Method};
+use crate::methods::Method;
 use crate::oracle::{Class, Truth};
-use crate::scenes::Scene;
-use crate::scenes::pcg::Pcg32;
-
-/// What was measured at one point.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Measured {
-    pub(crate) class: Class,
-    /// Squared irradiance.
-    e2: f64,
-    /// Variance of the one-sample estimate.
-    variance: f64,
-    /// Share of samples that carry nothing.
-    zeros: f64,
-}
+use crate::variance::Measured;
 
 /// The exact variance of the choice of a triangle at one point.
 #[derive(Clone, Copy, Debug)]
@@ -35,51 +22,6 @@ pub(crate) struct Summary {
     pub(crate) median: f64,
     pub(crate) p90: f64,
     pub(crate) energy_weighted: f64,
-}
-
-/// Samples a method at a point whose irradiance is positive. The variance is the mean squared difference from the
-/// true irradiance, so that a bias counts as well.
-pub(crate) fn measure(
-    scene: &Scene,
-    method: &dyn Method,
-    x: &ShadingPoint,
-    truth: &Truth,
-    samples: usize,
-    seed: u64,
-) -> Measured {
-    let mut pcg = Pcg32::new(seed, 5);
-    let (mut squares, mut zeros) = (0.0, 0);
-    for _ in 0..samples {
-        let estimate = method.sample(x, pcg.uniform3()).map_or(0.0, |drawn| contribution(scene, x, &drawn) / drawn.pdf);
-        zeros += usize::from(estimate == 0.0);
-        let error = estimate - truth.total;
-        squares += error * error;
-    }
-    let n = samples as f64;
-    Measured {
-        class: truth.class,
-        e2: truth.total * truth.total,
-        variance: squares / n,
-        zeros: f64::from(zeros as u32) / n,
-    }
-}
-
-/// Radiance from a direction times the cosine.
-pub(crate) fn contribution(scene: &Scene, x: &ShadingPoint, drawn: &Drawn) -> f64 {
-    let cosine = f64::from(x.cosine(drawn.direction));
-    if cosine == 0.0 {
-        return 0.0;
-    }
-    let Some(sky) = &scene.sky else {
-        return cosine * scene.weight(drawn.light, drawn.barycentrics.map(f64::from));
-    };
-    match scene.transmittance(x.position.as_dvec3(), drawn.direction.as_dvec3()) {
-        0.0 => 0.0,
-        transmittance => {
-            let radiance = drawn.radiance.unwrap_or_else(|| f64::from(sky.environment.radiance(drawn.direction)));
-            cosine * transmittance * radiance
-        }
-    }
 }
 
 /// Evaluates the choice of a triangle; `None` if the method makes none.

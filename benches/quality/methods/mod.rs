@@ -17,6 +17,7 @@ use ::fanlight::{Illumination, ShadingPoint};
 use glam::Vec3;
 
 use crate::scenes::Scene;
+pub(crate) use arvo::barycentrics;
 use triangle::{Choice, OnTriangle, ThenPoint};
 
 /// A direction that a method drew.
@@ -46,6 +47,11 @@ pub(crate) trait Method: Sync {
 
     /// Memory that sampling needs.
     fn bytes(&self) -> usize;
+
+    /// Whether it keeps an environment of its own, whose radiance it hands over with each direction.
+    fn has_own_environment(&self) -> bool {
+        false
+    }
 
     /// Whether it is so slow that only its choice of a triangle is evaluated.
     fn is_slow(&self) -> bool {

@@ -184,4 +184,8 @@ impl Method for Rectified {
     fn bytes(&self) -> usize {
         size_of_val(&self.image[..]) + size_of_val(&self.density[..]) + size_of_val(&self.sums[..])
     }
+
+    fn has_own_environment(&self) -> bool {
+        true
+    }
 }

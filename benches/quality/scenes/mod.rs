@@ -170,8 +170,10 @@ impl Scene {
         if let Weight::Constant(weight) = self.lights[light].weight {
             return f64::from(weight);
         }
-        // Centres of the cells of a regular subdivision.
-        let n = self.image.as_ref().map_or(1, |image| 2 * image.size).min(512);
+        // Centres of the cells of a regular subdivision, two along a texel.
+        let [a, b, c] = self.lights[light].uvs;
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        let n = self.image.as_ref().map_or(1, |image| (2.0 * longest * image.size as f64).ceil() as usize).max(1);
         let (mut sum, mut count) = (0.0, 0.0);
         for i in 0..n {
             for j in 0..n - i {

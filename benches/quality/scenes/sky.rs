@@ -10,6 +10,9 @@ const SUN: f64 = 20_000.0;
 /// Directions per axis of a sun texel that stand for it in the oracle.
 const SUN_SAMPLES: usize = 16;
 
+/// Solid angle that each of these directions stands for.
+pub(crate) const SUN_SAMPLE_SOLID_ANGLE: f64 = 16.0 * FRAC_PI_4 / ((SIZE * SUN_SAMPLES) * (SIZE * SUN_SAMPLES)) as f64;
+
 /// The environment as the crate has it, and what oracles know about it.
 #[derive(Clone, Debug)]
 pub(crate) struct Sky {
@@ -56,12 +59,11 @@ fn is_sun(direction: DVec3) -> bool {
 }
 
 fn sun_samples(texel: usize) -> impl Iterator<Item = (DVec3, f64)> {
-    let solid_angle = 16.0 * FRAC_PI_4 / (SIZE * SUN_SAMPLES).pow(2) as f64;
     (0..SUN_SAMPLES * SUN_SAMPLES).map(move |k| {
         let place = |texel: usize, k: usize| (texel as f64 + (k as f64 + 0.5) / SUN_SAMPLES as f64) / SIZE as f64;
         let at = DVec2::new(place(texel % SIZE, k % SUN_SAMPLES), place(texel / SIZE, k / SUN_SAMPLES));
         let direction = square_to_sphere(at);
-        (direction, (SUN - smooth(direction.z)) * solid_angle)
+        (direction, (SUN - smooth(direction.z)) * SUN_SAMPLE_SOLID_ANGLE)
     })
 }
 
