@@ -116,9 +116,8 @@ struct Results {
 
 impl Results {
     fn new(scene: &Scene, method: &dyn Method, points: &[(ShadingPoint, Truth)], effort: &Effort) -> Self {
-        let reference = scene.sky.as_ref().map(|_| methods::build("uniform-solid-angle", scene));
-        let reference = reference.as_deref().filter(|_| !method.has_own_environment());
-        let estimator = Estimator { scene, method, reference };
+        let openings = scene.sky.as_ref().map(|_| methods::build("uniform-solid-angle", scene));
+        let estimator = Estimator { scene, method, openings: openings.as_deref() };
         let measure =
             |i: usize, (x, truth): &(ShadingPoint, Truth)| estimator.measure(x, truth, effort.samples, i as u64);
         let measured = if method.is_slow() { vec![] } else { parallel(points, measure) };

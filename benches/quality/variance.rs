@@ -3,7 +3,7 @@
 use fanlight::ShadingPoint;
 use glam::DVec3;
 
-use crate::methods::{Drawn, Method, barycentrics};
+use crate::methods::{Cumulative, Drawn, Method, OnTriangle, barycentrics};
 use crate::oracle::{Class, Truth};
 use crate::scenes::Scene;
 use crate::scenes::pcg::Pcg32;
@@ -30,23 +30,41 @@ pub(crate) struct Measured {
 pub(crate) struct Estimator<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) method: &'a dyn Method,
-    /// Directions through the openings, to find what the method seldom draws. Plain sampling without.
-    pub(crate) reference: Option<&'a dyn Method>,
+    /// Uniform directions through the openings of a scene that has any.
+    pub(crate) openings: Option<&'a dyn Method>,
+}
+
+/// Draws what a method may draw too seldom for plain Monte Carlo to see.
+enum Reference<'a> {
+    /// Uniform directions through the openings.
+    Openings(&'a dyn Method),
+    /// Lights in proportion to their true irradiance, uniform directions to each.
+    Lights(&'a Truth, Cumulative),
 }
 
 impl Estimator<'_> {
     /// Measures at a point whose irradiance is positive.
     pub(crate) fn measure(&self, x: &ShadingPoint, truth: &Truth, samples: usize, seed: u64) -> Measured {
         let mut pcg = Pcg32::new(seed, 5);
-        let (variance, zeros) = match (self.reference, &self.scene.sky) {
-            (Some(reference), Some(sky)) => {
-                let (rest, zeros) = self.mixture(reference, x, truth.total, samples, &mut pcg);
-                let sun = if truth.class == Class::Sun { self.sun(sky, x, truth.total) } else { 0.0 };
-                (rest + sun, zeros)
-            }
-            _ => self.plain(x, truth.total, samples, &mut pcg),
+        let (rest, zeros) = match self.reference(truth) {
+            Some(reference) => self.mixture(&reference, x, truth.total, samples, &mut pcg),
+            None => self.plain(x, truth.total, samples, &mut pcg),
         };
+        let sun = match (&self.scene.sky, truth.class) {
+            (Some(sky), Class::Sun) if !self.method.has_own_environment() => self.sun(sky, x, truth.total),
+            _ => 0.0,
+        };
+        let variance = rest + sun;
         Measured { class: truth.class, e2: truth.total * truth.total, variance, zeros }
+    }
+
+    fn reference<'t>(&'t self, truth: &'t Truth) -> Option<Reference<'t>> {
+        if self.method.has_own_environment() {
+            return None;
+        }
+        let is_plain = self.scene.sky.is_none() && self.scene.image.is_none();
+        let lights = || Reference::Lights(truth, Cumulative::new(truth.by_light.iter().copied()));
+        self.openings.map(Reference::Openings).or_else(|| is_plain.then(lights))
     }
 
     /// Plain Monte Carlo with the method's own samples.
@@ -65,7 +83,7 @@ impl Estimator<'_> {
     /// reference, weighted by the balance heuristic (Veach 1997).
     fn mixture(
         &self,
-        reference: &dyn Method,
+        reference: &Reference<'_>,
         x: &ShadingPoint,
         irradiance: f64,
         samples: usize,
@@ -84,12 +102,12 @@ impl Estimator<'_> {
         for _ in 0..half {
             match self.method.sample(x, pcg.uniform3()) {
                 Some(drawn) => {
-                    let f = add(&drawn, drawn.pdf, self.reference_density(reference, x, &drawn));
+                    let f = add(&drawn, drawn.pdf, reference.pdf(self.scene, x, &drawn));
                     zeros += f64::from(u8::from(f == 0.0));
                 }
                 None => missed += 1.0,
             }
-            if let Some(drawn) = reference.sample(x, pcg.uniform3()) {
+            if let Some(drawn) = reference.sample(self.scene, x, pcg.uniform3()) {
                 add(&drawn, self.method.pdf(x, &drawn), drawn.pdf);
             }
         }
@@ -99,12 +117,6 @@ impl Estimator<'_> {
 
     fn is_sun(&self, drawn: &Drawn) -> bool {
         self.scene.sky.as_ref().is_some_and(|sky| sky.environment.radiance(drawn.direction) > BRIGHT)
-    }
-
-    /// Density of the reference in a direction that may miss all openings.
-    fn reference_density(&self, reference: &dyn Method, x: &ShadingPoint, drawn: &Drawn) -> f64 {
-        let direction = drawn.direction.as_dvec3();
-        locate(self.scene, x, direction).map_or(0.0, |drawn| reference.pdf(x, &drawn))
     }
 
     /// The same integral over the visible part of the sun, by quadrature.
@@ -120,13 +132,46 @@ impl Estimator<'_> {
     }
 }
 
+impl Reference<'_> {
+    fn sample(&self, scene: &Scene, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
+        let (truth, choice) = match self {
+            Self::Openings(method) => return method.sample(x, u),
+            Self::Lights(truth, choice) => (truth, choice),
+        };
+        let light = choice.sample(u[0]);
+        let vertices = relative(scene, light, x);
+        let (direction, place, density) = REFERENCE.sample(&vertices, [f64::from(u[1]), f64::from(u[2])]);
+        let pdf = truth.by_light[light] / truth.total * density;
+        let barycentrics = place.map(|b| b as f32);
+        Some(Drawn { light, barycentrics, direction: direction.as_vec3(), pdf, radiance: None })
+    }
+
+    /// Density of what the method drew, which may be a direction that misses all openings.
+    fn pdf(&self, scene: &Scene, x: &ShadingPoint, drawn: &Drawn) -> f64 {
+        match self {
+            Self::Openings(method) => {
+                locate(scene, x, drawn.direction.as_dvec3()).map_or(0.0, |drawn| method.pdf(x, &drawn))
+            }
+            Self::Lights(truth, _) => match truth.by_light[drawn.light] / truth.total {
+                0.0 => 0.0,
+                share => share * REFERENCE.density(&relative(scene, drawn.light, x), drawn.direction.as_dvec3()),
+            },
+        }
+    }
+}
+
+/// How the reference draws a direction to a light.
+const REFERENCE: OnTriangle = OnTriangle::SolidAngle;
+
+fn relative(scene: &Scene, light: usize, x: &ShadingPoint) -> [DVec3; 3] {
+    scene.lights[light].vertices.map(|v| v - x.position.as_dvec3())
+}
+
 /// The point of an opening that a direction passes.
 fn locate(scene: &Scene, x: &ShadingPoint, direction: DVec3) -> Option<Drawn> {
-    let position = x.position.as_dvec3();
     // With several walls methods look at the direction alone.
-    let (light, _) = scene.walls[0].meet(position, direction, scene.image.as_ref())?;
-    let relative = scene.lights[light].vertices.map(|v| v - position);
-    let barycentrics = barycentrics(&relative, direction).map(|b| b as f32);
+    let (light, _) = scene.walls[0].meet(x.position.as_dvec3(), direction, scene.image.as_ref())?;
+    let barycentrics = barycentrics(&relative(scene, light, x), direction).map(|b| b as f32);
     Some(Drawn { light, barycentrics, direction: direction.as_vec3(), pdf: 0.0, radiance: None })
 }
 

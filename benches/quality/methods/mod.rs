@@ -18,7 +18,9 @@ use glam::Vec3;
 
 use crate::scenes::Scene;
 pub(crate) use arvo::barycentrics;
-use triangle::{Choice, OnTriangle, ThenPoint};
+pub(crate) use discrete::Cumulative;
+pub(crate) use triangle::OnTriangle;
+use triangle::{Choice, ThenPoint};
 
 /// A direction that a method drew.
 #[derive(Clone, Copy, Debug)]

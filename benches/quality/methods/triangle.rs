@@ -37,6 +37,33 @@ pub(crate) enum OnTriangle {
     SolidAngle,
 }
 
+impl OnTriangle {
+    /// A direction to a triangle that is seen from the origin, the place that it meets, and its density per solid
+    /// angle.
+    pub(crate) fn sample(self, vertices: &[DVec3; 3], u: [f64; 2]) -> (DVec3, [f64; 2], f64) {
+        if self == Self::SolidAngle
+            && let Some(triangle) = SphericalTriangle::new(vertices)
+        {
+            let direction = triangle.sample(u);
+            return (direction, barycentrics(vertices, direction), 1.0 / triangle.solid_angle);
+        }
+        let place = uniform(u);
+        let [a, b, c] = *vertices;
+        let direction = (a + (b - a) * place[0] + (c - a) * place[1]).normalize();
+        (direction, place, area_density(vertices, direction))
+    }
+
+    /// Density per solid angle of a direction to the triangle.
+    pub(crate) fn density(self, vertices: &[DVec3; 3], direction: DVec3) -> f64 {
+        if self == Self::SolidAngle
+            && let Some(triangle) = SphericalTriangle::new(vertices)
+        {
+            return 1.0 / triangle.solid_angle;
+        }
+        area_density(vertices, direction)
+    }
+}
+
 pub(crate) struct ThenPoint<'a> {
     scene: &'a Scene,
     choice: Choice,
@@ -84,22 +111,12 @@ impl<'a> ThenPoint<'a> {
         second / (first + second)
     }
 
-    /// Density per solid angle of a direction, once its triangle is chosen.
-    fn density(&self, vertices: &[DVec3; 3], direction: DVec3) -> f64 {
-        if self.on == OnTriangle::SolidAngle
-            && let Some(triangle) = SphericalTriangle::new(vertices)
-        {
-            return 1.0 / triangle.solid_angle;
-        }
-        area_density(vertices, direction)
-    }
-
     /// Sum of the densities of all triangles along a direction.
     fn direction_density(&self, x: &ShadingPoint, direction: DVec3) -> f64 {
         let density = |light: usize| {
             let vertices = self.relative(light, x);
             if front(&vertices) && crosses(&vertices, direction) {
-                self.pmf(x, light) * self.density(&vertices, direction)
+                self.pmf(x, light) * self.on.density(&vertices, direction)
             } else {
                 0.0
             }
@@ -138,20 +155,7 @@ impl Method for ThenPoint<'_> {
         if !front(&vertices) {
             return None;
         }
-        let u = [f64::from(u[1]), f64::from(u[2])];
-        let spherical = if self.on == OnTriangle::SolidAngle { SphericalTriangle::new(&vertices) } else { None };
-        let (direction, place, density) = match spherical {
-            Some(triangle) => {
-                let direction = triangle.sample(u);
-                (direction, barycentrics(&vertices, direction), 1.0 / triangle.solid_angle)
-            }
-            None => {
-                let place = uniform(u);
-                let [a, b, c] = vertices;
-                let direction = (a + (b - a) * place[0] + (c - a) * place[1]).normalize();
-                (direction, place, area_density(&vertices, direction))
-            }
-        };
+        let (direction, place, density) = self.on.sample(&vertices, [f64::from(u[1]), f64::from(u[2])]);
         let pdf = if self.layered { self.direction_density(x, direction) } else { pmf * density };
         Some(Drawn {
             light,
@@ -167,7 +171,7 @@ impl Method for ThenPoint<'_> {
         if self.layered {
             return self.direction_density(x, direction);
         }
-        self.pmf(x, drawn.light) * self.density(&self.relative(drawn.light, x), direction)
+        self.pmf(x, drawn.light) * self.on.density(&self.relative(drawn.light, x), direction)
     }
 
     fn pmfs(&self, x: &ShadingPoint, wanted: &dyn Fn(usize) -> bool) -> Option<Vec<f64>> {
