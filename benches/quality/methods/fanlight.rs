@@ -1,0 +1,73 @@
+//! The crate itself.
+
+use ::fanlight::{Hit, Illumination, LightSampler, Mesh, ShadingPoint, Weight};
+
+use super::{Drawn, Method};
+use crate::scenes::sky::environment;
+use crate::scenes::{Scene, Weight as SceneWeight};
+
+pub(crate) struct Fanlight<'a> {
+    scene: &'a Scene,
+    sampler: LightSampler,
+    /// Whether a ray can cross several portals, so that the density of a point is not that of its direction.
+    layered: bool,
+}
+
+impl<'a> Fanlight<'a> {
+    /// The crate with its defaults, or with another term inside of triangles.
+    pub(crate) fn new(scene: &'a Scene, illumination: Option<Illumination>) -> Self {
+        let mut builder = LightSampler::builder();
+        if let Some(illumination) = illumination {
+            builder.illumination(illumination);
+        }
+        if let Some(sky) = &scene.sky {
+            builder.environment(environment(&sky.texels));
+        }
+        let texture = scene.image.as_ref().map(|image| builder.add_texture(image.texture()));
+        for mesh in &scene.meshes {
+            let new = if mesh.portal { Mesh::portal } else { Mesh::emitter };
+            let weight = match (mesh.weight, texture) {
+                (SceneWeight::Image, Some(texture)) => Weight::Texture(texture),
+                (SceneWeight::Constant(weight), _) => Weight::Constant(weight),
+                (SceneWeight::Image, None) => panic!("the scene has no image"),
+            };
+            let mesh = new(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).weight(weight);
+            builder.add_mesh(&mesh).expect("workloads are valid");
+        }
+        let sampler = builder.build().expect("workloads are valid");
+        Self { scene, sampler, layered: scene.walls.len() > 1 }
+    }
+}
+
+impl Method for Fanlight<'_> {
+    #[inline]
+    fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
+        let sample = self.sampler.sample(x, u)?;
+        let pdf = if self.layered { self.sampler.pdf_sample_direction(x, &sample) } else { sample.pdf };
+        Some(Drawn {
+            light: self.scene.light_index(sample.hit.triangle),
+            barycentrics: sample.hit.barycentrics,
+            direction: sample.direction,
+            pdf: f64::from(pdf),
+            radiance: None,
+        })
+    }
+
+    #[inline]
+    fn pdf(&self, x: &ShadingPoint, drawn: &Drawn) -> f64 {
+        if self.layered {
+            return f64::from(self.sampler.pdf_direction(x, drawn.direction));
+        }
+        let hit = Hit { triangle: self.scene.lights[drawn.light].id, barycentrics: drawn.barycentrics };
+        f64::from(self.sampler.pdf(x, &hit))
+    }
+
+    fn pmfs(&self, x: &ShadingPoint, wanted: &dyn Fn(usize) -> bool) -> Option<Vec<f64>> {
+        let pmf = |l: usize| if wanted(l) { self.sampler.pmf(x, self.scene.lights[l].id) } else { 0.0 };
+        Some((0..self.scene.lights.len()).map(|l| f64::from(pmf(l))).collect())
+    }
+
+    fn bytes(&self) -> usize {
+        self.sampler.as_view().bytes().iter().sum()
+    }
+}

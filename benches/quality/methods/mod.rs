@@ -1,0 +1,124 @@
+//! What is compared: the crate, and the methods that it must beat.
+
+mod arvo;
+mod binary_tree;
+mod discrete;
+mod environment_reject;
+mod every_light;
+mod fanlight;
+mod light_bounds;
+mod power;
+mod rectified;
+mod tessellated;
+mod texel_cdf;
+mod triangle;
+
+use ::fanlight::{Illumination, ShadingPoint};
+use glam::Vec3;
+
+use crate::scenes::Scene;
+pub(crate) use arvo::barycentrics;
+pub(crate) use discrete::Cumulative;
+pub(crate) use triangle::OnTriangle;
+use triangle::{Choice, ThenPoint};
+
+/// A direction that a method drew.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drawn {
+    /// The triangle and the place on it, unless the method draws directions alone.
+    pub(crate) light: usize,
+    pub(crate) barycentrics: [f32; 2],
+    /// Unit direction from the shading point.
+    pub(crate) direction: Vec3,
+    /// Density per solid angle: that of the point for emitters, that of the direction for portals.
+    pub(crate) pdf: f64,
+    /// What the method itself takes for the environment's radiance, if it keeps its own.
+    pub(crate) radiance: Option<f64>,
+}
+
+/// A way to sample the lights of a scene.
+pub(crate) trait Method: Sync {
+    /// Draws a direction.
+    fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn>;
+
+    /// Density per solid angle of what a method drew, found anew.
+    fn pdf(&self, x: &ShadingPoint, drawn: &Drawn) -> f64;
+
+    /// Probability of choosing each light that is `wanted`, or `None` if the method chooses none.
+    fn pmfs(&self, x: &ShadingPoint, wanted: &dyn Fn(usize) -> bool) -> Option<Vec<f64>>;
+
+    /// Memory that sampling needs.
+    fn bytes(&self) -> usize;
+
+    /// Whether it keeps an environment of its own, whose radiance it hands over with each direction.
+    fn has_own_environment(&self) -> bool {
+        false
+    }
+
+    /// Whether it is so slow that only its choice of a triangle is evaluated.
+    fn is_slow(&self) -> bool {
+        false
+    }
+}
+
+/// Methods that are run on a workload by default.
+pub(crate) fn names(workload: &str) -> &'static [&'static str] {
+    match workload {
+        "cloud-10000" | "sphere-29" => &["fanlight", "power", "binary-tree", "every-light"],
+        "cloud-100000" => &["fanlight", "power", "binary-tree"],
+        "quad" => &[
+            "fanlight",
+            "talk-conservative",
+            "talk-point-to-point",
+            "talk-boundary",
+            "uniform-area",
+            "uniform-solid-angle",
+            "texel-cdf",
+            "tessellated",
+        ],
+        "sphere-9-spots" => &[
+            "fanlight",
+            "talk-conservative",
+            "talk-point-to-point",
+            "talk-boundary",
+            "uniform-area",
+            "uniform-solid-angle",
+            "texel-cdf",
+        ],
+        "window" | "star" => &[
+            "fanlight",
+            "talk-conservative",
+            "talk-point-to-point",
+            "talk-boundary",
+            "environment-reject",
+            "uniform-solid-angle",
+            "rectified",
+        ],
+        _ => &["fanlight", "environment-reject", "uniform-solid-angle", "rectified"],
+    }
+}
+
+/// Builds the data that a method needs for a scene.
+pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
+    let talk = |illumination| Box::new(fanlight::Fanlight::new(scene, Some(illumination)));
+    match name {
+        "fanlight" => Box::new(fanlight::Fanlight::new(scene, None)),
+        "talk-conservative" => talk(Illumination::Conservative),
+        "talk-point-to-point" => talk(Illumination::PointToPoint),
+        "talk-boundary" => talk(Illumination::Boundary),
+        "power" => Box::new(ThenPoint::new(scene, Choice::Power(power::Power::new(scene)), OnTriangle::SolidAngle)),
+        "binary-tree" | "uniform-solid-angle" => {
+            Box::new(ThenPoint::new(scene, triangle::best_choice(scene), OnTriangle::SolidAngle))
+        }
+        "uniform-area" => Box::new(ThenPoint::new(scene, triangle::best_choice(scene), OnTriangle::Area)),
+        "every-light" => {
+            let choice = Choice::Every(every_light::EveryLight::new(scene));
+            Box::new(ThenPoint::new(scene, choice, OnTriangle::SolidAngle))
+        }
+        "texel-cdf" => Box::new(texel_cdf::TexelCdf::new(scene)),
+        "tessellated" => Box::new(tessellated::Tessellated::new(scene)),
+        "environment-reject" => Box::new(environment_reject::EnvironmentReject::new(scene)),
+        "rectified" => Box::new(rectified::Rectified::new(scene)),
+        _ => panic!("no method is called {name}"),
+    }
+}

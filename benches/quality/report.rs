@@ -1,0 +1,118 @@
+//! Rows as a table and as JSON.
+
+use core::fmt::Write as _;
+
+use crate::metrics::Summary;
+use crate::timing::Nanoseconds;
+
+/// One workload, method and class.
+#[derive(Clone, Debug)]
+pub(crate) struct Row {
+    pub(crate) workload: String,
+    pub(crate) method: String,
+    pub(crate) class: &'static str,
+    pub(crate) relvar: Option<Summary>,
+    pub(crate) selection: Option<Summary>,
+    /// Largest share of a point's irradiance that comes from triangles of probability zero.
+    pub(crate) lost: Option<f64>,
+    pub(crate) zero_rate: Option<f64>,
+    pub(crate) nanoseconds: Nanoseconds,
+    pub(crate) bytes: usize,
+    pub(crate) build_ms: f64,
+}
+
+impl Row {
+    /// Precision that a second of sampling buys: `1 / (relvar seconds)`.
+    fn efficiency(&self, relvar: impl Fn(&Summary) -> f64) -> Option<f64> {
+        self.relvar.map(|summary| 1e9 / (relvar(&summary) * self.nanoseconds.sample))
+    }
+}
+
+/// Three figures, whatever the size.
+fn short(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".into(),
+        a if !(1e-4..1e7).contains(&a) => format!("{value:.1e}"),
+        a => {
+            let digits = (2 - a.log10().floor() as i32).max(0) as usize;
+            format!("{value:.digits$}")
+        }
+    }
+}
+
+/// Prints the head of the table.
+pub(crate) fn print_head() {
+    println!(
+        "{:16} {:20} {:6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>6} {:>7} {:>7} {:>9} {:>8} {:>8}",
+        "workload",
+        "method",
+        "class",
+        "relvar",
+        "p90",
+        "EW",
+        "exactsel",
+        "EW",
+        "lost",
+        "zero",
+        "ns",
+        "ns pdf",
+        "bytes",
+        "build ms",
+        "eff EW"
+    );
+}
+
+/// Prints one row. Efficiency is that of the energy-weighted variance.
+pub(crate) fn print(row: &Row) {
+    let figure = |value: Option<f64>| value.map_or_else(|| "-".into(), short);
+    let relvar = |get: fn(&Summary) -> f64| figure(row.relvar.as_ref().map(get));
+    let selection = |get: fn(&Summary) -> f64| figure(row.selection.as_ref().map(get));
+    println!(
+        "{:16} {:20} {:6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>6} {:>7} {:>7} {:>9} {:>8} {:>8}",
+        row.workload,
+        row.method,
+        row.class,
+        relvar(|s| s.median),
+        relvar(|s| s.p90),
+        relvar(|s| s.energy_weighted),
+        selection(|s| s.median),
+        selection(|s| s.energy_weighted),
+        figure(row.lost),
+        figure(row.zero_rate),
+        short(row.nanoseconds.sample),
+        short(row.nanoseconds.pdf),
+        row.bytes,
+        short(row.build_ms),
+        figure(row.efficiency(|s| s.energy_weighted)),
+    );
+}
+
+/// All rows as a list of objects.
+pub(crate) fn json(rows: &[Row]) -> String {
+    let objects: Vec<String> = rows.iter().map(object).collect();
+    format!("[\n{}\n]\n", objects.join(",\n"))
+}
+
+fn object(row: &Row) -> String {
+    let number =
+        |value: Option<f64>| value.filter(|v| v.is_finite()).map_or_else(|| "null".into(), |v| format!("{v:e}"));
+    let mut out =
+        format!("  {{\"workload\": \"{}\", \"method\": \"{}\", \"class\": \"{}\"", row.workload, row.method, row.class);
+    let figures = [
+        ("relvar_median", row.relvar.map(|s| s.median)),
+        ("relvar_p90", row.relvar.map(|s| s.p90)),
+        ("relvar_ew", row.relvar.map(|s| s.energy_weighted)),
+        ("exact_sel_median", row.selection.map(|s| s.median)),
+        ("exact_sel_ew", row.selection.map(|s| s.energy_weighted)),
+        ("exact_sel_lost", row.lost),
+        ("zero_rate", row.zero_rate),
+        ("ns_sample", Some(row.nanoseconds.sample)),
+        ("ns_pdf", Some(row.nanoseconds.pdf)),
+        ("bytes", Some(row.bytes as f64)),
+        ("build_ms", Some(row.build_ms)),
+    ];
+    for (key, value) in figures {
+        write!(out, ", \"{key}\": {}", number(value)).expect("a string takes everything");
+    }
+    out + "}"
+}
