@@ -156,7 +156,7 @@ fn triangles_are_chosen_with_their_probability() {
 /// One split gives no triangle twice, so that each triangle's count is binomial whatever its neighbours do.
 #[test]
 fn splitting_visits_triangles_as_often_as_it_expects() {
-    let settings = [(0.5, 1, 100_000), (0.9, 2, 60_000), (1.0, 2, 3000)];
+    let settings = [(0.5, 1, 200_000), (0.9, 2, 120_000), (1.0, 2, 10_000)];
     let found = parallel::map(settings.len(), |i| {
         let (threshold, levels, rounds) = settings[i];
         let splitting = Splitting { threshold, levels };
