@@ -130,7 +130,7 @@ mod warp;
 struct Readme;
 
 pub use blas::Texture;
-pub use env::{Environment, EnvironmentHeader, EnvironmentSample, EnvironmentView};
+pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSample, EnvironmentView, Sun, SunTexel};
 pub use error::Error;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};

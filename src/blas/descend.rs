@@ -86,6 +86,19 @@ impl Guide for Follow {
     }
 }
 
+/// Average of the texture over the smallest cell of the tree that holds a point.
+pub(crate) fn average<const M: usize>(nodes: &[Node<M>], root: Root, point: Lattice) -> f32 {
+    let Root { mut average, mut node } = root;
+    let (mut local, mut size) = (point.0, barycentric::LATTICE);
+    while node != LEAF {
+        let (index, below) = barycentric::child::<M>(local, size);
+        average = nodes[node as usize].average(index);
+        node = nodes[node as usize].below(index);
+        (local, size) = (below, size >> barycentric::level_halvings::<M>());
+    }
+    average
+}
+
 /// Descends from the whole triangle to a cell over which the density is constant. Returns it with its probability;
 /// `None` where nothing can arrive from the cell that the guide leads to.
 pub(crate) fn descend<const M: usize>(

@@ -4,6 +4,7 @@ use super::descend::EnvironmentSample;
 use super::pyramid::Pyramid;
 use super::resample::resample;
 use super::source::{Edges, Source};
+use super::suns::{Suns, finest};
 use super::view::{EnvironmentHeader, EnvironmentView};
 use super::{BRIGHTEST, DARKEST, MAX_DEPTH, rotation};
 use crate::error::{Error, Kind};
@@ -26,6 +27,7 @@ use glam::{Mat3, Vec3};
 pub struct Environment {
     header: EnvironmentHeader,
     pyramid: Pyramid,
+    suns: Suns,
 }
 
 impl Environment {
@@ -116,23 +118,25 @@ impl Environment {
             return Self::uniform(radiance, source.clamped);
         }
         // One texel is cut by all seams of the map; take the mean of four instead.
-        let pyramid = Pyramid::new(depth.max(1), resample(source, edges, depth.max(1)));
+        let image = resample(source, edges, depth.max(1));
+        let suns = if depth == 0 { Suns::none() } else { Suns::find(depth, finest(depth, &image)) };
+        let pyramid = Pyramid::new(depth.max(1), image, suns.cap);
         let [low, high] = pyramid.ranges[0];
         if depth == 0 || low == high {
             return Self::uniform(pyramid.means[0], source.clamped);
         }
-        Self::from_pyramid(depth, pyramid, source.clamped)
+        Self::from_pyramid(depth, pyramid, suns, source.clamped)
     }
 
     fn uniform(radiance: f32, clamped_texels: u32) -> Self {
-        Self::from_pyramid(0, Pyramid::new(0, vec![radiance]), clamped_texels)
+        Self::from_pyramid(0, Pyramid::new(0, vec![radiance], f32::INFINITY), Suns::none(), clamped_texels)
     }
 
-    fn from_pyramid(depth: u32, pyramid: Pyramid, clamped_texels: u32) -> Self {
+    fn from_pyramid(depth: u32, pyramid: Pyramid, suns: Suns, clamped_texels: u32) -> Self {
         let mean = pyramid.means[0];
-        let max = pyramid.ranges.first().map_or(mean, |&[_, max]| max);
+        let max = finest(depth, &pyramid.means).iter().copied().fold(0.0, f32::max);
         let rotation = Mat3::IDENTITY.to_cols_array_2d();
-        Self { header: EnvironmentHeader { rotation, depth, mean, max, clamped_texels, padding: 0 }, pyramid }
+        Self { header: EnvironmentHeader { rotation, depth, mean, max, clamped_texels, cap: suns.cap }, pyramid, suns }
     }
 
     /// Turns the environment. `rotation` takes directions of the environment's frame to the world.
@@ -159,7 +163,7 @@ impl Environment {
     /// The borrowed form, which does all the work.
     #[inline]
     pub fn as_view(&self) -> EnvironmentView<'_> {
-        EnvironmentView::from_pyramid(self.header, &self.pyramid)
+        EnvironmentView::from_pyramid(self.header, &self.pyramid, &self.suns)
     }
 
     /// [`EnvironmentView::sample`].
@@ -183,6 +187,11 @@ impl Environment {
     /// [`EnvironmentView::mean`].
     pub fn mean(&self) -> f32 {
         self.header.mean
+    }
+
+    /// Mean radiance over the sphere without the suns.
+    pub(crate) fn mean_without_suns(&self) -> f32 {
+        self.as_view().mean_without_suns()
     }
 
     /// [`EnvironmentView::max`].

@@ -1,7 +1,8 @@
 //! Sampling a direction of the environment in proportion to its radiance, and the density of that.
 
-use super::pyramid::children;
+use super::pyramid::{children, level_start};
 use super::rotation::to_world;
+use super::suns::Sun;
 use super::view::EnvironmentView;
 use crate::warp::discrete::pick_pair;
 use crate::warp::equal_area::{SPHERE, square_to_sphere};
@@ -52,6 +53,46 @@ impl EnvironmentView<'_> {
         let direction = to_world(&self.header.rotation, square_to_sphere(point));
         let radiance = self.mean_at(self.header.depth, x, y);
         Some(EnvironmentSample { direction, radiance, pdf: self.pdf_of(radiance) })
+    }
+
+    /// Draws a world direction in a sun, with a density in proportion to its excess over the cap.
+    pub(crate) fn sample_sun(&self, sun: usize, mut u: [Variate; 2]) -> Vec3 {
+        let [start, end] = self.suns[sun].range;
+        let texels = &self.sun_texels[start as usize..end as usize];
+        let target = u[1].value_f32();
+        let chosen = texels.partition_point(|texel| texel.sum <= target).min(texels.len() - 1);
+        let below = if chosen == 0 { 0.0 } else { f64::from(texels[chosen - 1].sum) };
+        let width = f64::from(texels[chosen].sum) - below;
+        u[1].stretch(u[1].value() - below, width, 1.0);
+        let (depth, texel) = (self.header.depth, texels[chosen].texel);
+        let (x, y) = (texel & ((1 << depth) - 1), texel >> depth);
+        let point = Vec2::new(self.inside(x, u[0].value_f32()), self.inside(y, u[1].value_f32()));
+        to_world(&self.header.rotation, square_to_sphere(point))
+    }
+
+    /// The sun that a world direction lies in, and the density per solid angle with which
+    /// [`sample_sun`](Self::sample_sun) draws it.
+    #[inline]
+    pub(crate) fn sun_at(&self, direction: Vec3) -> Option<(usize, f32)> {
+        if self.suns.is_empty() {
+            return None;
+        }
+        let texel = self.texel(direction);
+        let radiance = self.means[level_start(self.header.depth) + texel as usize];
+        if radiance <= self.header.cap {
+            return None;
+        }
+        let holds = |sun: &Sun| {
+            let texels = &self.sun_texels[sun.range[0] as usize..sun.range[1] as usize];
+            texels.binary_search_by_key(&texel, |texel| texel.texel).is_ok()
+        };
+        let sun = self.suns.iter().position(holds)?;
+        Some((sun, (radiance - self.header.cap) / self.suns[sun].power))
+    }
+
+    /// Axis of a sun in the world.
+    pub(crate) fn sun_axis(&self, sun: usize) -> Vec3 {
+        to_world(&self.header.rotation, Vec3::from_array(self.suns[sun].axis))
     }
 
     /// Density, per solid angle, with which [`sample`](Self::sample) draws a unit world direction.

@@ -11,7 +11,6 @@
 //! continuous path (`wrap_texel`), no coordinate of which moves by more than `STRETCH · ρ`. So the image ends in
 //! the box of that half side around the centre, and the texels that the box touches, wrapped, hold the point.
 
-use super::pyramid::level_start;
 use super::rotation::to_local;
 use super::view::EnvironmentView;
 use crate::math;
@@ -85,7 +84,7 @@ impl EnvironmentView<'_> {
         let scale = (1_u32 << depth) as f32;
         let last = (1 << depth) - 1;
         let (x, y) = (((center.x * scale) as u32).min(last), ((center.y * scale) as u32).min(last));
-        let talk = self.filtered[level_start(depth) + ((y << depth) | x) as usize];
+        let talk = self.filtered_at(depth, x, y);
         let value = (1.0 - DEFENSIVE) * talk + DEFENSIVE * cover.mean;
         Average { value: value.max(f32::MIN_POSITIVE), even: cover.min >= EVEN * cover.max }
     }
@@ -97,7 +96,7 @@ impl EnvironmentView<'_> {
         let depth = self.depth_of_side(2.0 * half);
         if depth == 0 {
             let [min, max] = self.ranges[0];
-            return Cover { mean: self.header.mean, min, max };
+            return Cover { mean: self.mean_without_suns(), min, max };
         }
         let size = 1_i32 << depth;
         let scale = size as f32;
@@ -112,7 +111,7 @@ impl EnvironmentView<'_> {
                 let (i, j) = wrap_texel_log2(i, j, depth);
                 let [low, high] = self.range_at(depth, i, j);
                 (min, max) = (min.min(low), max.max(high));
-                sum += self.mean_at(depth, i, j);
+                sum += self.filtered_at(depth, i, j);
                 count += 1.0;
             }
         }

@@ -14,6 +14,7 @@ mod pyramid;
 mod resample;
 mod rotation;
 mod source;
+mod suns;
 #[cfg(test)]
 mod tests;
 mod view;
@@ -21,6 +22,9 @@ mod view;
 pub use build::Environment;
 pub use descend::EnvironmentSample;
 pub(crate) use footprint::Footprint;
+pub use parts::EnvironmentParts;
+pub(crate) use suns::MAX_SUNS;
+pub use suns::{Sun, SunTexel};
 pub use view::{EnvironmentHeader, EnvironmentView};
 
 /// Largest radiance of a texel. What is brighter is refused.

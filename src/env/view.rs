@@ -2,6 +2,7 @@
 
 use super::pyramid::{Pyramid, level_start};
 use super::rotation::to_local;
+use super::suns::{Sun, SunTexel, Suns};
 use crate::warp::equal_area::{SPHERE, sphere_to_square};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec3};
@@ -20,8 +21,9 @@ pub struct EnvironmentHeader {
     pub max: f32,
     /// Number of negative texels of the input, all clamped to zero.
     pub clamped_texels: u32,
-    /// Zero.
-    pub padding: u32,
+    /// Radiance at which texels are capped in `ranges` and `filtered`: what is above it is in the suns. Infinite
+    /// without suns.
+    pub cap: f32,
 }
 
 const _: () = assert!(size_of::<EnvironmentHeader>() == 56);
@@ -36,35 +38,38 @@ pub struct EnvironmentView<'a> {
     pub(super) header: EnvironmentHeader,
     /// Means of all levels, the coarsest (one texel) first, rows from the square's `y = 0`.
     pub(super) means: &'a [f32],
-    /// Minimum and maximum of all levels but the finest, laid out like `means`.
+    /// Minimum and maximum of all levels of the capped image but the finest, laid out like `means`.
     pub(super) ranges: &'a [[f32; 2]],
-    /// 3x3 box-filtered means of all levels, laid out like `means`.
+    /// 3x3 box-filtered means of all levels of the capped image, laid out like `means`.
     pub(super) filtered: &'a [f32],
+    /// Clusters of texels above the cap.
+    pub(super) suns: &'a [Sun],
+    /// Their texels.
+    pub(super) sun_texels: &'a [SunTexel],
 }
 
 impl<'a> EnvironmentView<'a> {
-    pub(super) fn from_pyramid(header: EnvironmentHeader, pyramid: &'a Pyramid) -> Self {
-        Self { header, means: &pyramid.means, ranges: &pyramid.ranges, filtered: &pyramid.filtered }
+    pub(super) fn from_pyramid(header: EnvironmentHeader, pyramid: &'a Pyramid, suns: &'a Suns) -> Self {
+        Self {
+            header,
+            means: &pyramid.means,
+            ranges: &pyramid.ranges,
+            filtered: &pyramid.filtered,
+            suns: &suns.suns,
+            sun_texels: &suns.texels,
+        }
     }
 
-    /// The fixed part, to be stored with the slices.
-    pub fn header(&self) -> &EnvironmentHeader {
-        &self.header
+    /// Clusters of texels that are much brighter than the rest.
+    #[inline]
+    pub fn suns(&self) -> &'a [Sun] {
+        self.suns
     }
 
-    /// Means of all levels of the pyramid, the coarsest first.
-    pub fn means(&self) -> &'a [f32] {
-        self.means
-    }
-
-    /// Minimum and maximum of all levels of the pyramid but the finest, the coarsest first.
-    pub fn ranges(&self) -> &'a [[f32; 2]] {
-        self.ranges
-    }
-
-    /// 3x3 box-filtered means of all levels of the pyramid, the coarsest first.
-    pub fn filtered_means(&self) -> &'a [f32] {
-        self.filtered
+    /// Mean radiance over the sphere without the suns.
+    #[inline]
+    pub(crate) fn mean_without_suns(&self) -> f32 {
+        self.filtered[0]
     }
 
     /// Mean radiance over the sphere.
@@ -114,13 +119,25 @@ impl<'a> EnvironmentView<'a> {
         if self.is_constant() {
             return self.header.mean;
         }
+        self.means[level_start(self.header.depth) + self.texel(direction) as usize]
+    }
+
+    /// Number of the texel of the finest level that a unit world direction falls into.
+    #[inline]
+    pub(super) fn texel(&self, direction: Vec3) -> u32 {
         let depth = self.header.depth;
         let point = sphere_to_square(to_local(&self.header.rotation, direction));
         let scale = (1_u32 << depth) as f32;
         // The product is exact, and the cast truncates; the square's far edges belong to the last texel.
         let last = (1 << depth) - 1;
         let (x, y) = (((point.x * scale) as u32).min(last), ((point.y * scale) as u32).min(last));
-        self.means[level_start(depth) + ((y << depth) | x) as usize]
+        (y << depth) | x
+    }
+
+    /// 3x3 filtered mean of a texel of the level with `2^depth` texels a side, without the suns.
+    #[inline]
+    pub(super) fn filtered_at(&self, depth: u32, x: u32, y: u32) -> f32 {
+        self.filtered[level_start(depth) + ((y << depth) | x) as usize]
     }
 
     /// Mean of a texel of the level with `2^depth` texels a side.
@@ -133,7 +150,7 @@ impl<'a> EnvironmentView<'a> {
     #[inline]
     pub(super) fn range_at(&self, depth: u32, x: u32, y: u32) -> [f32; 2] {
         if depth == self.header.depth {
-            [self.mean_at(depth, x, y); 2]
+            [self.mean_at(depth, x, y).min(self.header.cap); 2]
         } else {
             self.ranges[level_start(depth) + ((y << depth) | x) as usize]
         }

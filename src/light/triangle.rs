@@ -125,6 +125,13 @@ impl<'a> Lit<'a> {
         geometry::intersect(self.vertices, direction)
     }
 
+    /// Solid angle at the shading point per area of the light at this place: `cos θl / d²`.
+    #[inline]
+    pub(crate) fn solid_angle_per_area(&self, point: Vec3) -> f64 {
+        let distance2 = f64::from(point.length_squared());
+        f64::from(self.height) / (distance2 * crate::math::sqrt64(distance2))
+    }
+
     /// Density per solid angle of a point with this density per area, at this place relative to the shading point:
     /// `p_A d² / cos θl`. `None` where it is not a positive number.
     #[inline]

@@ -110,7 +110,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// If there are more triangles than the tree can number (2^28 - 1).
     pub fn build(self) -> Result<LightSampler<N, M>, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
-        let (lights, bounds) = select(&self.triangles, &environment);
+        let (lights, bounds, energy) = select(&self.triangles, &environment);
         if lights.len() > MAX_LEAVES {
             return Err(Error(ErrorKind::TooMany { what: "light triangles", count: lights.len(), limit: MAX_LEAVES }));
         }
@@ -126,6 +126,8 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
             leaves: self.places.iter().map(leaf_at).collect(),
             meshes: self.meshes,
             cells: self.cells,
+            energy,
+            portals: self.triangles.iter().any(LightTriangle::is_portal),
             environment,
             illumination: self.illumination,
         })
@@ -199,9 +201,9 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     }
 }
 
-/// Which triangles send anything in this environment, and the bounds of each.
-fn select(triangles: &[LightTriangle], environment: &Environment) -> (Vec<u32>, Vec<(LightBounds, Moments)>) {
-    let mean = f64::from(environment.mean());
+/// Which triangles send anything in this environment, the bounds of each, and the energy of all.
+fn select(triangles: &[LightTriangle], environment: &Environment) -> (Vec<u32>, Vec<(LightBounds, Moments)>, f32) {
+    let mean = f64::from(environment.mean_without_suns());
     let energy = |light: &LightTriangle| {
         let radiance = if light.is_portal() { mean } else { 1.0 };
         let area = light.triangle().normal_and_area().map_or(0.0, |(_, area)| f64::from(area));
@@ -226,5 +228,5 @@ fn select(triangles: &[LightTriangle], environment: &Environment) -> (Vec<u32>, 
         (bounds, Moments { energy: share, mean, variance, normal })
     };
     let bounds = lights.iter().map(bounds).collect();
-    (lights, bounds)
+    (lights, bounds, total.min(f64::from(f32::MAX)) as f32)
 }

@@ -9,7 +9,7 @@ use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
 
 use super::lights::{LightSampler, LightSamplerView, NO_LEAF};
 use crate::blas;
-use crate::env::{EnvironmentHeader, EnvironmentView};
+use crate::env::{EnvironmentHeader, EnvironmentParts, EnvironmentView};
 use crate::error::Error;
 use crate::light::Illumination;
 use crate::tlas::TlasView;
@@ -19,7 +19,7 @@ const MAGIC: [u8; 8] = *b"fanlight";
 const VERSION: u32 = 1;
 /// Reads differently on a machine of the other byte order.
 const BYTE_ORDER: u32 = 0x0102_0304;
-const BUFFERS: usize = 11;
+const BUFFERS: usize = 13;
 /// Every buffer consists of 4-byte numbers.
 const ALIGNMENT: usize = 4;
 
@@ -31,6 +31,8 @@ struct Header {
     byte_order: u32,
     arities: [u32; 2],
     illumination: u32,
+    energy: f32,
+    portals: u32,
     padding: u32,
     /// Lengths of the buffers in bytes.
     lengths: [u64; BUFFERS],
@@ -54,17 +56,20 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             byte_order: BYTE_ORDER,
             arities: [N as u32, M as u32],
             illumination: self.illumination as u32,
+            energy: self.energy,
+            portals: self.portals.into(),
             padding: 0,
             lengths: buffers.map(|buffer| buffer.len() as u64),
         };
-        let environment = self.environment.header();
+        let environment = self.environment.parts().header;
         let mut bytes = bytemuck::bytes_of(&header).to_vec();
-        bytes.extend_from_slice(bytemuck::bytes_of(environment));
+        bytes.extend_from_slice(bytemuck::bytes_of(&environment));
         buffers.into_iter().for_each(|buffer| bytes.extend_from_slice(buffer));
         bytes
     }
 
     fn buffers(&self) -> [&'a [u8]; BUFFERS] {
+        let environment = self.environment.parts();
         [
             bytemuck::cast_slice(self.tlas.nodes),
             bytemuck::cast_slice(self.tlas.parents),
@@ -74,9 +79,11 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             bytemuck::cast_slice(self.cells),
             bytemuck::cast_slice(self.meshes),
             bytemuck::cast_slice(self.leaves),
-            bytemuck::cast_slice(self.environment.means()),
-            bytemuck::cast_slice(self.environment.ranges()),
-            bytemuck::cast_slice(self.environment.filtered_means()),
+            bytemuck::cast_slice(environment.means),
+            bytemuck::cast_slice(environment.ranges),
+            bytemuck::cast_slice(environment.filtered_means),
+            bytemuck::cast_slice(environment.suns),
+            bytemuck::cast_slice(environment.sun_texels),
         ]
     }
 
@@ -91,9 +98,22 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
         let mut reader = Reader { bytes, at: 0 };
         let header: Header = reader.value("header")?;
         header.check(N, M)?;
-        let environment: EnvironmentHeader = reader.value("header of the environment")?;
-        let [nodes, parents, spreads, leaves, triangles, cells, meshes, places, means, ranges, filtered] =
-            header.lengths;
+        let environment_header: EnvironmentHeader = reader.value("header of the environment")?;
+        let [
+            nodes,
+            parents,
+            spreads,
+            leaves,
+            triangles,
+            cells,
+            meshes,
+            places,
+            means,
+            ranges,
+            filtered,
+            suns,
+            sun_texels,
+        ] = header.lengths;
         let view = Self {
             illumination: Illumination::from_u32(header.illumination)
                 .ok_or_else(|| Error::bytes("illumination", 0, header.illumination, 0u64))?,
@@ -107,12 +127,16 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             cells: reader.slice("cells", cells)?,
             meshes: reader.slice("meshes", meshes)?,
             leaves: reader.slice("leaves of the triangles", places)?,
-            environment: EnvironmentView::from_parts(
-                environment,
-                reader.slice("means", means)?,
-                reader.slice("ranges", ranges)?,
-                reader.slice("filtered means", filtered)?,
-            )?,
+            environment: EnvironmentView::from_parts(EnvironmentParts {
+                header: environment_header,
+                means: reader.slice("means", means)?,
+                ranges: reader.slice("ranges", ranges)?,
+                filtered_means: reader.slice("filtered means", filtered)?,
+                suns: reader.slice("suns", suns)?,
+                sun_texels: reader.slice("texels of suns", sun_texels)?,
+            })?,
+            energy: header.energy,
+            portals: header.portals != 0,
         };
         reader.end()?;
         view.validate()?;
@@ -150,6 +174,10 @@ impl Header {
         expect("magic number", u64::from_le_bytes(self.magic), u64::from_le_bytes(MAGIC))?;
         expect("byte order", self.byte_order.into(), BYTE_ORDER.into())?;
         expect("version", self.version.into(), VERSION.into())?;
+        if !(self.energy >= 0.0 && self.energy < f32::INFINITY) {
+            return Err(Error::bytes("energy", 0, self.energy.to_bits(), 0u64));
+        }
+        expect("mark of portals", (self.portals & !1).into(), 0)?;
         expect("arity of the tree over triangles", self.arities[0].into(), n as u64)?;
         expect("arity of the trees over textures", self.arities[1].into(), m as u64)
     }

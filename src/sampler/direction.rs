@@ -3,6 +3,9 @@
 use glam::Vec3;
 
 use super::lights::{LightSampler, LightSamplerView};
+use super::sample::to_finite;
+use super::suns::Techniques;
+use crate::blas::Lattice;
 use crate::record::{LightSample, ShadingPoint};
 use crate::tlas::Splitting;
 
@@ -25,18 +28,35 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     /// lights that the ray from `x` crosses, found by the crate's own traversal. `direction` need not have unit
     /// length.
     pub fn pdf_direction(&self, x: &ShadingPoint, direction: Vec3) -> f32 {
-        to_finite(self.direction_density(x, direction, None, None))
+        to_finite(self.direction_density(x, direction, &self.techniques(x), None))
     }
 
     /// [`Self::pdf_direction`] of a sample's own direction. The sampled point counts with its own density whatever
     /// rounding does to the ray, so the result is never below `sample.pdf`.
     pub fn pdf_sample_direction(&self, x: &ShadingPoint, sample: &LightSample) -> f32 {
+        let techniques = self.techniques(x);
         let sampled = self.leaf(sample.hit.triangle);
-        to_finite(f64::from(sample.pdf) + self.direction_density(x, sample.direction, sampled, None))
+        let trees = techniques.trees * self.tree_density(x, sample.direction, sampled, None);
+        // The sun's part is in `sample.pdf` if the sampled point is where the ray first crosses a portal.
+        let sun = self.sun_density(x, sample.direction, None, &techniques);
+        let in_sample = if sun > 0.0 { self.sun_density(x, sample.direction, sampled, &techniques) } else { 0.0 };
+        to_finite(f64::from(sample.pdf) + trees + (sun - in_sample))
     }
 
-    /// Sum of the densities of all points along a ray, but for those of one leaf.
+    /// Density of a direction by all techniques.
     pub(super) fn direction_density(
+        &self,
+        x: &ShadingPoint,
+        direction: Vec3,
+        techniques: &Techniques,
+        splitting: Option<&Splitting>,
+    ) -> f64 {
+        let trees = techniques.trees * self.tree_density(x, direction, None, splitting);
+        if techniques.is_trees() { trees } else { trees + self.sun_density(x, direction, None, techniques) }
+    }
+
+    /// Sum of the densities by the trees of all points along a ray, but for those of one leaf.
+    fn tree_density(
         &self,
         x: &ShadingPoint,
         direction: Vec3,
@@ -48,14 +68,11 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             if Some(leaf) == except {
                 return;
             }
-            let hit = self.lit(leaf, x).and_then(|lit| lit.intersect(direction));
-            density += hit.and_then(|hit| self.pdf_on(leaf, hit, x, splitting)).unwrap_or(0.0);
+            let Some(lit) = self.lit(leaf, x) else { return };
+            if let Some(hit) = lit.intersect(direction) {
+                density += self.tree_pdf(leaf, Lattice::from_barycentrics(hit), x, &lit, splitting);
+            }
         });
         density
     }
-}
-
-/// A density in single precision: zero stays zero, and nothing overflows or vanishes.
-pub(super) fn to_finite(pdf: f64) -> f32 {
-    if pdf > 0.0 { super::sample::to_positive(pdf) } else { 0.0 }
 }

@@ -31,6 +31,10 @@ pub struct LightSampler<const N: usize = 8, const M: usize = 4> {
     pub(super) leaves: Vec<u32>,
     pub(super) environment: Environment,
     pub(super) illumination: Illumination,
+    /// Energy of all triangles together, without the suns: weight times area, times mean radiance for portals.
+    pub(super) energy: f32,
+    /// Whether any triangle is a portal.
+    pub(super) portals: bool,
 }
 
 /// All lights of a scene in borrowed memory: plain data that can be mapped from a file or shared between processes.
@@ -43,6 +47,8 @@ pub struct LightSamplerView<'a, const N: usize = 8, const M: usize = 4> {
     pub(super) leaves: &'a [u32],
     pub(super) environment: EnvironmentView<'a>,
     pub(super) illumination: Illumination,
+    pub(super) energy: f32,
+    pub(super) portals: bool,
 }
 
 impl LightSampler {
@@ -64,6 +70,8 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
             leaves: &self.leaves,
             environment: self.environment.as_view(),
             illumination: self.illumination,
+            energy: self.energy,
+            portals: self.portals,
         }
     }
 
@@ -101,9 +109,13 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             + size_of_val(self.tlas.spreads)
             + size_of_val(self.tlas.leaves);
         let triangles = size_of_val(self.triangles) + size_of_val(self.meshes) + size_of_val(self.leaves);
-        let environment = size_of_val(self.environment.means())
-            + size_of_val(self.environment.ranges())
-            + size_of_val(self.environment.filtered_means());
+        let parts = self.environment.parts();
+        let environment = size_of_val(&parts.header)
+            + size_of_val(parts.means)
+            + size_of_val(parts.ranges)
+            + size_of_val(parts.filtered_means)
+            + size_of_val(parts.suns)
+            + size_of_val(parts.sun_texels);
         [tlas, triangles, size_of_val(self.cells), environment]
     }
 
@@ -118,6 +130,10 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     /// A triangle as seen from a shading point; `None` if nothing can arrive from it.
     pub(super) fn lit(&self, leaf: u32, x: &ShadingPoint) -> Option<Lit<'a>> {
         Lit::new(&self.triangles[leaf as usize], x, self.illumination, self.directional_environment())
+    }
+
+    pub(super) fn has_portals(&self) -> bool {
+        self.portals
     }
 
     /// The environment, if what it shows depends on the direction.
@@ -140,7 +156,7 @@ pub(super) struct Scene<'a> {
 
 impl tlas::Scene for Scene<'_> {
     fn radiance(&self, center: Vec3, radius: f32) -> f32 {
-        let mean = self.environment.mean();
+        let mean = self.environment.mean_without_suns();
         if mean <= 0.0 {
             return 0.0;
         }

@@ -8,6 +8,7 @@ mod mesh;
 mod pdf;
 mod sample;
 mod split;
+mod suns;
 
 pub use builder::LightSamplerBuilder;
 pub use lights::{LightSampler, LightSamplerView};

@@ -1,8 +1,10 @@
 //! Densities of a given point or triangle.
 
 use super::lights::{LightSampler, LightSamplerView};
-use super::sample::{follow, to_positive};
+use super::sample::{Drawn, follow, to_finite};
+use super::suns::Techniques;
 use crate::blas::Lattice;
+use crate::light::Lit;
 use crate::record::{Hit, ShadingPoint, TriangleId};
 use crate::tlas::Splitting;
 
@@ -26,32 +28,53 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     ///
     /// Where a ray can cross several portals, what a host wants is [`Self::pdf_direction`].
     pub fn pdf(&self, x: &ShadingPoint, hit: &Hit) -> f32 {
-        self.leaf(hit.triangle).and_then(|leaf| self.pdf_on(leaf, hit.barycentrics, x, None)).map_or(0.0, to_positive)
+        self.pdf_of_hit(x, hit, &self.techniques(x), None)
     }
 
-    /// Probability with which [`Self::sample`] chooses this triangle, in `[0, 1]`.
+    /// Probability with which the trees choose this triangle, in `[0, 1]`. Where suns of the environment are seen
+    /// through portals, samples that are drawn towards them come on top; without any, this is the probability with
+    /// which [`Self::sample`] chooses it.
     pub fn pmf(&self, x: &ShadingPoint, triangle: TriangleId) -> f32 {
-        self.leaf(triangle).map_or(0.0, |leaf| self.tlas.pmf(leaf, x, &self.scene(x)) as f32)
+        let trees = self.techniques(x).trees;
+        self.leaf(triangle).map_or(0.0, |leaf| (trees * self.tree_count(leaf, x, None)) as f32)
     }
 
-    /// Density per solid angle of a point of the triangle in a leaf, for single or split samples; `None` for zero.
-    pub(super) fn pdf_on(
+    /// Probability of a triangle by the trees, or expected number of visits if they are split.
+    pub(super) fn tree_count(&self, leaf: u32, x: &ShadingPoint, splitting: Option<&Splitting>) -> f64 {
+        match splitting {
+            None => self.tlas.pmf(leaf, x, &self.scene(x)),
+            Some(splitting) => self.tlas.expected_count(leaf, x, &self.scene(x), splitting),
+        }
+    }
+
+    /// Density per solid angle of a hit by all techniques.
+    pub(super) fn pdf_of_hit(
+        &self,
+        x: &ShadingPoint,
+        hit: &Hit,
+        techniques: &Techniques,
+        splitting: Option<&Splitting>,
+    ) -> f32 {
+        let Some(leaf) = self.leaf(hit.triangle) else { return 0.0 };
+        let Some(lit) = self.lit(leaf, x) else { return 0.0 };
+        let place = Lattice::from_barycentrics(hit.barycentrics);
+        let tree_pdf = self.tree_pdf(leaf, place, x, &lit, splitting);
+        let drawn = Drawn { leaf, place, count: 0.0, tree_pdf };
+        to_finite(self.mixed_pdf(&drawn, lit.point(place), x, techniques))
+    }
+
+    /// Density per solid angle of a point of the triangle in a leaf by the trees.
+    pub(super) fn tree_pdf(
         &self,
         leaf: u32,
-        barycentrics: [f32; 2],
+        place: Lattice,
         x: &ShadingPoint,
+        lit: &Lit<'_>,
         splitting: Option<&Splitting>,
-    ) -> Option<f64> {
-        let lit = self.lit(leaf, x)?;
-        let scene = self.scene(x);
-        let count = match splitting {
-            None => self.tlas.pmf(leaf, x, &scene),
-            Some(splitting) => self.tlas.expected_count(leaf, x, &scene, splitting),
-        };
-        if count == 0.0 {
-            return None;
+    ) -> f64 {
+        match self.tree_count(leaf, x, splitting) {
+            0.0 => 0.0,
+            count => count * follow(self.cells, self.triangles[leaf as usize].root, lit, place).unwrap_or(0.0),
         }
-        let root = self.triangles[leaf as usize].root;
-        Some(count * follow(self.cells, root, &lit, Lattice::from_barycentrics(barycentrics))?)
     }
 }

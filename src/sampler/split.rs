@@ -3,8 +3,8 @@
 use glam::Vec3;
 use smallvec::{Array, SmallVec};
 
-use super::direction::to_finite;
 use super::lights::{LightSampler, LightSamplerView};
+use super::sample::to_finite;
 use crate::record::{Hit, LightSample, ShadingPoint};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
@@ -37,7 +37,7 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
 
 impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     /// Draws one point from each part of the light tree that adaptive splitting visits (Conty Estevez and Kulla
-    /// 2018), and appends them to `samples`, which allocates only if they do not fit inline.
+    /// 2018), and one towards a sun if any is seen, and appends them to `samples`, which allocates only if they do not fit inline.
     ///
     /// The estimate is the *sum* of `f / pdf` over the samples: `pdf` and `pdf_area` are expected densities, the
     /// expected number of samples per measure, and `pmf` the expected number on that triangle.
@@ -54,6 +54,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             let key = 4 * u64::from(draw) + i as u64;
             Variate::scrambled(u[i], key, salt ^ key)
         };
+        let techniques = self.techniques(x).side_by_side();
         let mut visits = 0;
         self.tlas.sample_split(
             x,
@@ -61,22 +62,28 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             splitting,
             |draw| variate(draw, 0),
             |leaf, count| {
-                samples.extend(self.sample_on(leaf, count, x, [variate(visits, 1), variate(visits, 2)]));
+                let point = [variate(visits, 1), variate(visits, 2)];
+                samples.extend(self.sample_on(leaf, count, x, point, &techniques));
                 visits += 1;
             },
         );
+        // A draw that no part of the tree has.
+        let last = u32::MAX >> 2;
+        if let Some(sun) = techniques.choose_sun(&mut variate(last, 0)) {
+            let point = [variate(last, 1), variate(last, 2)];
+            samples.extend(self.sample_sun(sun, x, point, &techniques, Some(splitting)));
+        }
     }
 
     /// Expected density per solid angle of the samples of [`Self::sample_split`] at a point of a triangle, for
     /// multiple importance sampling.
     pub fn pdf_split(&self, x: &ShadingPoint, hit: &Hit, splitting: &Splitting) -> f32 {
-        let leaf = self.leaf(hit.triangle);
-        to_finite(leaf.and_then(|leaf| self.pdf_on(leaf, hit.barycentrics, x, Some(splitting))).unwrap_or(0.0))
+        self.pdf_of_hit(x, hit, &self.techniques(x).side_by_side(), Some(splitting))
     }
 
     /// Expected density per solid angle of the samples of [`Self::sample_split`] in a direction: the sum over all
     /// points that the ray crosses.
     pub fn pdf_split_direction(&self, x: &ShadingPoint, direction: Vec3, splitting: &Splitting) -> f32 {
-        to_finite(self.direction_density(x, direction, None, Some(splitting)))
+        to_finite(self.direction_density(x, direction, &self.techniques(x).side_by_side(), Some(splitting)))
     }
 }

@@ -48,6 +48,12 @@ impl<const N: usize> TlasView<'_, N> {
         self.path(leaf).map(|(node, lane)| pmf(&self.nodes[node].weights(x, scene), lane)).product()
     }
 
+    /// Estimate of the irradiance from all leaves, in units of the sum of their energies. Zero for a tree without
+    /// nodes.
+    pub(crate) fn irradiance(&self, x: &ShadingPoint, scene: &impl Scene) -> f32 {
+        self.nodes.first().map_or(0.0, |root| root.weights(x, scene).iter().sum())
+    }
+
     /// Nodes and lanes on the way from a leaf to the root.
     pub(super) fn path(&self, leaf: u32) -> impl Iterator<Item = (usize, usize)> {
         core::iter::successors(self.leaves[leaf as usize].get::<N>(), |&(node, _)| self.parents[node].get::<N>())
