@@ -62,12 +62,11 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
         };
         factor * f64::from(lights.pdf(&x, hit))
     };
-    let varies = !scene.images.is_empty() || !matches!(scene.sky, Sky::Constant(_));
     let mut expected = Vec::with_capacity(observed.len());
     for triangle in scene.triangles() {
         let on = OnTriangle::new(&scene, triangle, &x, &pdf);
-        let least_depth = if varies && lights.pmf(&x, id(triangle)) > 1e-4 { 4 } else { 0 };
-        let integrals = on.integrate(DEPTH, least_depth, &probes[triangle.0][triangle.1]);
+        let least_depth = if lights.pmf(&x, id(triangle)) > 1e-4 { 4 } else { 2 };
+        let (integrals, _) = on.integrate(DEPTH, least_depth, &probes[triangle.0][triangle.1]);
         expected.extend(integrals.iter().map(|share| share * SAMPLES as f64));
     }
     let shortfall = SAMPLES as f64 - expected.iter().sum::<f64>();

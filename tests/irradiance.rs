@@ -17,7 +17,7 @@ use glam::{DVec3, Vec3};
 
 /// Standard errors that an estimate may be off.
 const LIMIT: f64 = 4.0;
-const SAMPLES: usize = 20_000;
+const SAMPLES: usize = 40_000;
 const POINTS: usize = 20;
 /// Relative error of the integral, of which four per mille would already show.
 const ORACLE_ERROR: f64 = 5e-4;

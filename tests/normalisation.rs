@@ -23,21 +23,16 @@ const NEGLIGIBLE: f64 = 2e-5;
 struct Found {
     name: String,
     integral: f64,
+    unresolved: f64,
     samples: usize,
     missed: usize,
 }
 
-/// Integral of the density over all triangles.
-fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[LightSample], wrong: bool) -> f64 {
+/// Integral of the density over all triangles, and the most that it can be wrong by where the density varies over
+/// less than the integration resolves.
+fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[LightSample], wrong: bool) -> (f64, f64) {
     let count = scene.triangles().count();
-    let varies = !scene.images.is_empty() || !matches!(scene.sky, common::scene::Sky::Constant(_));
-    let least_depth = if !varies {
-        0
-    } else if count < 1000 {
-        4
-    } else {
-        2
-    };
+    let least_depth = if count < 1000 { 4 } else { 2 };
     let probes = probes(scene, samples);
     let pdf = |hit: &Hit| {
         let factor = if wrong && hit.barycentrics[0] > 0.5 { 1.1 } else { 1.0 };
@@ -47,16 +42,18 @@ fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[Lig
     triangles.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut left: f64 = triangles.iter().map(|t| t.0).sum();
     assert!(left <= 1.0 + 1e-5, "{}: the triangles' probabilities add up to {left}", scene.name);
-    let mut sum = 0.0;
+    let (mut sum, mut unresolved) = (0.0, 0.0);
     for (pmf, triangle) in triangles {
         if left < NEGLIGIBLE {
             break;
         }
         left -= pmf;
         let on = OnTriangle::new(scene, triangle, x, &pdf);
-        sum += on.integrate(0, least_depth, &probes[triangle.0][triangle.1])[0];
+        let (whole, open) = on.integrate(0, least_depth, &probes[triangle.0][triangle.1]);
+        sum += whole[0];
+        unresolved += open;
     }
-    sum
+    (sum, unresolved)
 }
 
 fn examine(content: Content, number: usize, receiver: usize, count: usize, wrong: bool) -> Found {
@@ -81,9 +78,9 @@ fn examine_moved(
     x.position = change(x.position);
     let samples: Vec<_> = (0..count).filter_map(|_| lights.sample(&x, pcg.cube())).collect();
     let probing = &samples[..samples.len().min(2000)];
-    let integral = integral(&scene, &*lights, &x, probing, wrong);
+    let (integral, unresolved) = integral(&scene, &*lights, &x, probing, wrong);
     let name = format!("{} {arities:?} {:?} {x:?}", scene.name, scene.illumination);
-    Found { name, integral, samples: count, missed: count - samples.len() }
+    Found { name, integral, unresolved, samples: count, missed: count - samples.len() }
 }
 
 /// Sizes with every texturing and sky; the largest with some.
@@ -132,8 +129,13 @@ fn the_density_integrates_to_one_at_any_scale() {
     });
     for found in &found {
         let deviation = (found.integral + found.missed as f64 / found.samples as f64 - 1.0).abs();
-        assert!(deviation < TOLERANCE, "{}: {}, missed {}", found.name, found.integral, found.missed);
+        let tolerance = TOLERANCE + found.unresolved;
+        assert!(deviation < tolerance, "{}: {}, missed {}", found.name, found.integral, found.missed);
     }
+    // A point next to a sliver sees densities that vary over less than the integration resolves.
+    let resolved = found.iter().filter(|found| found.unresolved < 0.1 * TOLERANCE).count();
+    println!("{resolved} of {count} scenes are resolved");
+    assert!(10 * resolved >= 9 * count, "only {resolved} of {count} scenes are resolved");
 }
 
 /// Everywhere else the shortfall is the rate of `None`. Each scene's binomial test has Šidák's share of 1 %.

@@ -115,7 +115,8 @@ impl EnvironmentView<'_> {
                 count += 1.0;
             }
         }
-        Cover { mean: sum / count, min, max }
+        // The filter reaches beyond the cover.
+        Cover { mean: (sum / count).clamp(min, max), min, max }
     }
 
     /// Depth of the finest level whose texels are at least as wide as `side`, so that it touches 2x2 at most.

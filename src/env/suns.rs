@@ -19,8 +19,8 @@ pub(crate) const MAX_SUNS: usize = 8;
 
 /// A texel this many times brighter than the mean of the capped image belongs to a sun.
 const CONTRAST: f64 = 16.0;
-/// Largest angular radius of a sun, as a cosine: 3°. What is larger is seen in part too often for a few rays.
-const LEAST_COS_RADIUS: f32 = 0.998_6;
+/// Largest angular radius of a sun, as a sine. What is larger is too often seen in part for a few rays to tell.
+const LARGEST: f32 = 0.15;
 /// A split that takes out less than this share of the flux is not worth its rays.
 const LEAST_SHARE: f64 = 0.01;
 /// Most texels in suns, as a share of the image.
@@ -101,8 +101,7 @@ impl Suns {
             let mut group = cluster(depth, bright, &mut taken, start);
             group.sort_unstable();
             let sun = found.add(depth, image, &group);
-            let cos_radius2 = 1.0 - sun.sin_radius * sun.sin_radius;
-            if cos_radius2 < LEAST_COS_RADIUS * LEAST_COS_RADIUS || !(sun.power > 0.0) {
+            if sun.sin_radius > LARGEST || sun.power <= 0.0 {
                 return None;
             }
             found.suns.push(sun);

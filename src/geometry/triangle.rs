@@ -38,6 +38,11 @@ impl Triangle {
         if length > 0.0 { cross.dot(point.as_dvec3() - self.0[0].as_dvec3()) / length } else { 0.0 }
     }
 
+    /// The vertices relative to a point, in double precision.
+    pub(crate) fn exactly_relative_to(&self, point: Vec3) -> [DVec3; 3] {
+        self.0.map(|vertex| vertex.as_dvec3() - point.as_dvec3())
+    }
+
     /// The vertices relative to a point.
     pub(crate) fn relative_to(&self, point: Vec3) -> [Vec3; 3] {
         self.0.map(|vertex| vertex - point)
@@ -45,9 +50,9 @@ impl Triangle {
 }
 
 /// Barycentrics `b1`, `b2` of the point where the ray from the origin along `direction` crosses the triangle with
-/// these vertices, or `None` if it does not. In double precision, after Möller and Trumbore (1997).
-pub(crate) fn intersect(vertices: [Vec3; 3], direction: Vec3) -> Option<[f32; 2]> {
-    let [a, b, c] = vertices.map(Vec3::as_dvec3);
+/// these vertices, or `None` if it does not. After Möller and Trumbore (1997).
+pub(crate) fn intersect(vertices: [DVec3; 3], direction: Vec3) -> Option<[f32; 2]> {
+    let [a, b, c] = vertices;
     let direction = direction.as_dvec3();
     let (e1, e2) = (b - a, c - a);
     let p = direction.cross(e2);
@@ -84,7 +89,7 @@ mod tests {
 
     #[test]
     fn rays_find_the_barycentrics() {
-        let vertices = [Vec3::new(-1.0, -1.0, 2.0), Vec3::new(3.0, -1.0, 2.0), Vec3::new(-1.0, 3.0, 2.0)];
+        let vertices = [DVec3::new(-1.0, -1.0, 2.0), DVec3::new(3.0, -1.0, 2.0), DVec3::new(-1.0, 3.0, 2.0)];
         let [b1, b2] = intersect(vertices, Vec3::Z).expect("the ray crosses");
         assert!((b1 - 0.25).abs() < 1e-7 && (b2 - 0.25).abs() < 1e-7);
         assert_eq!(intersect(vertices, Vec3::NEG_Z), None);

@@ -1,7 +1,7 @@
 //! One light triangle, and the same as it is seen from a shading point.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::illumination::{Illumination, is_below};
 use crate::blas::{Cell, Lattice, Root, Shape, Worth};
@@ -78,11 +78,15 @@ pub(crate) struct Lit<'a> {
     receiver: Receiver,
     /// Relative to the shading point.
     pub(crate) vertices: [Vec3; 3],
+    /// The same in double precision.
+    exact_vertices: [DVec3; 3],
     /// Unit normal of the front side.
     pub(crate) normal: Vec3,
     pub(crate) area: f32,
     /// Distance of the shading point from the triangle's plane.
     height: f32,
+    /// The same in double precision.
+    exact_height: f64,
     illumination: Illumination,
     /// What the triangle is a portal to, if that depends on the direction.
     environment: Option<EnvironmentView<'a>>,
@@ -101,43 +105,46 @@ impl<'a> Lit<'a> {
         }
         let triangle = light.triangle();
         let (normal, area) = triangle.normal_and_area()?;
+        let height = triangle.height(x.position).abs();
         Some(Self {
             receiver: x.receiver,
             vertices: triangle.relative_to(x.position),
+            exact_vertices: triangle.exactly_relative_to(x.position),
             normal,
             area,
-            height: triangle.height(x.position).abs() as f32,
+            height: height as f32,
+            exact_height: height,
             illumination,
             environment: environment.filter(|_| light.is_portal()),
         })
     }
 
-    /// A point of the triangle relative to the shading point.
+    /// A point of the triangle relative to the shading point. In double precision, as the point may be much nearer
+    /// than the vertices.
     #[inline]
-    pub(crate) fn point(&self, point: Lattice) -> Vec3 {
-        let [b1, b2] = point.to_barycentrics();
-        let [v0, v1, v2] = self.vertices;
-        v0 * ((1.0 - b1) - b2) + v1 * b1 + v2 * b2
+    pub(crate) fn point(&self, point: Lattice) -> DVec3 {
+        let [b1, b2] = point.to_barycentrics().map(f64::from);
+        let [v0, v1, v2] = self.exact_vertices;
+        v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2
     }
 
     /// Barycentrics of the point where a ray from the shading point crosses the triangle.
     pub(crate) fn intersect(&self, direction: Vec3) -> Option<[f32; 2]> {
-        geometry::intersect(self.vertices, direction)
+        geometry::intersect(self.exact_vertices, direction)
     }
 
     /// Solid angle at the shading point per area of the light at this place: `cos θl / d²`.
     #[inline]
-    pub(crate) fn solid_angle_per_area(&self, point: Vec3) -> f64 {
-        let distance2 = f64::from(point.length_squared());
-        f64::from(self.height) / (distance2 * crate::math::sqrt64(distance2))
+    pub(crate) fn solid_angle_per_area(&self, point: DVec3) -> f64 {
+        let distance2 = point.length_squared();
+        self.exact_height / (distance2 * crate::math::sqrt64(distance2))
     }
 
     /// Density per solid angle of a point with this density per area, at this place relative to the shading point:
     /// `p_A d² / cos θl`. `None` where it is not a positive number.
     #[inline]
-    pub(crate) fn per_solid_angle(&self, pdf_area: f64, point: Vec3) -> Option<f64> {
-        let distance2 = f64::from(point.length_squared());
-        let pdf = pdf_area * distance2 * crate::math::sqrt64(distance2) / f64::from(self.height);
+    pub(crate) fn per_solid_angle(&self, pdf_area: f64, point: DVec3) -> Option<f64> {
+        let pdf = pdf_area / self.solid_angle_per_area(point);
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
 }

@@ -1,6 +1,6 @@
 //! A point on the lights for a shading point.
 
-use glam::Vec3;
+use glam::DVec3;
 
 use super::lights::{LightSampler, LightSamplerView};
 use super::suns::{Crossing, Technique, Techniques};
@@ -78,16 +78,16 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         let relative = lit.point(drawn.place);
         let pdf = self.mixed_pdf(drawn, relative, x, techniques);
         let distance = relative.length();
-        let positive = pdf > 0.0 && distance > 0.0;
+        let positive = pdf > 0.0 && distance > 0.0 && distance.is_finite();
         positive.then(|| LightSample {
             hit: Hit {
                 triangle: self.triangles[drawn.leaf as usize].id(),
                 barycentrics: drawn.place.to_barycentrics(),
             },
-            position: x.position + relative,
+            position: (x.position.as_dvec3() + relative).as_vec3(),
             normal: lit.normal,
-            direction: relative / distance,
-            distance,
+            direction: (relative / distance).as_vec3(),
+            distance: distance as f32,
             pdf: to_positive(pdf),
             pdf_area: to_positive(pdf * lit.solid_angle_per_area(relative)),
             pmf: to_positive(drawn.count * techniques.trees),
@@ -96,12 +96,12 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
 
     /// Density per solid angle by all techniques together.
     #[inline]
-    pub(super) fn mixed_pdf(&self, drawn: &Drawn, relative: Vec3, x: &ShadingPoint, techniques: &Techniques) -> f64 {
+    pub(super) fn mixed_pdf(&self, drawn: &Drawn, relative: DVec3, x: &ShadingPoint, techniques: &Techniques) -> f64 {
         let by_trees = techniques.trees * drawn.tree_pdf;
         if techniques.is_trees() {
             return by_trees;
         }
-        by_trees + self.sun_density(x, relative.normalize_or_zero(), Some(drawn.leaf), techniques)
+        by_trees + self.sun_density(x, relative.normalize_or_zero().as_vec3(), Some(drawn.leaf), techniques)
     }
 }
 

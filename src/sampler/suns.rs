@@ -11,6 +11,7 @@ use glam::Vec3;
 use super::lights::LightSamplerView;
 use crate::blas::{self, Lattice, Shape};
 use crate::env::MAX_SUNS;
+use crate::geometry;
 use crate::record::{Receiver, ShadingPoint};
 use crate::warp::{Variate, pick, sum};
 
@@ -24,7 +25,7 @@ const BRIGHTEST: f32 = 1e35;
 pub(super) struct Crossing {
     pub(super) leaf: u32,
     pub(super) place: Lattice,
-    distance: f32,
+    distance: f64,
 }
 
 /// How often each technique is used at one shading point.
@@ -154,11 +155,10 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             if !light.is_portal() || !light.is_visible(x) {
                 return;
             }
-            let vertices = light.triangle().relative_to(x.position);
-            let Some(hit) = crate::geometry::intersect(vertices, direction) else { return };
-            let [b1, b2] = hit;
-            let point = vertices[0] * (1.0 - b1 - b2) + vertices[1] * b1 + vertices[2] * b2;
-            let distance = point.length();
+            let vertices = light.triangle().exactly_relative_to(x.position);
+            let Some(hit) = geometry::intersect(vertices, direction) else { return };
+            let [b1, b2] = hit.map(f64::from);
+            let distance = (vertices[0] * (1.0 - b1 - b2) + vertices[1] * b1 + vertices[2] * b2).length();
             // Of equal ones the least leaf, so that it does not matter in which order they are visited.
             let nearer = first.is_none_or(|first| (distance, leaf) < (first.distance, first.leaf));
             if nearer {

@@ -47,14 +47,16 @@ impl<'a> OnTriangle<'a> {
 
     /// Integrals over the cells of a depth, in the order of [`bin`]. Cells are divided as long as the density differs
     /// inside of them: between the middles of their quarters or at one of the `probes`. Probes only tell where to
-    /// look closer; samples do well.
-    pub(crate) fn integrate(&self, bin_depth: u32, least_depth: u32, probes: &[[f32; 2]]) -> Vec<f64> {
+    /// look closer; samples do well. Second, the most that cells which were too small to divide can be wrong by.
+    pub(crate) fn integrate(&self, bin_depth: u32, least_depth: u32, probes: &[[f32; 2]]) -> (Vec<f64>, f64) {
         let mut bins = vec![0.0; 1 << (2 * bin_depth)];
         let probes = probes.iter().map(|b| (b.map(f64::from), self.density(b.map(f64::from)))).collect();
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-        let mut walk = Walk { on: self, bins: &mut bins, bin_depth, least_depth: least_depth.max(bin_depth) };
+        let mut walk =
+            Walk { on: self, bins: &mut bins, bin_depth, least_depth: least_depth.max(bin_depth), unresolved: 0.0 };
         walk.visit(corners, 0, 0, probes);
-        bins
+        let unresolved = walk.unresolved;
+        (bins, unresolved)
     }
 }
 
@@ -63,6 +65,7 @@ struct Walk<'a, 'b> {
     bins: &'a mut [f64],
     bin_depth: u32,
     least_depth: u32,
+    unresolved: f64,
 }
 
 impl Walk<'_, '_> {
@@ -74,6 +77,9 @@ impl Walk<'_, '_> {
             let (low, high) = all().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
             if high - low <= 1e-4 * high || depth >= DEEPEST {
                 let share = 0.25f64.powi(depth as i32);
+                if high - low > 1e-4 * high {
+                    self.unresolved += share * (high - low);
+                }
                 self.bins[bin] += share * values.iter().sum::<f64>() / 4.0;
                 return;
             }
