@@ -7,7 +7,7 @@ use common::density::{OnTriangle, bin, id, probes};
 use common::lights::{ARITIES, build};
 use common::parallel;
 use common::pcg::Pcg32;
-use common::scene::{Content, Scene, Sky, random_point};
+use common::scene::{Content, Scene, random_point};
 use common::statistics::{binomial_p, chi_square, sidak};
 use fanlight::{Hit, ShadingPoint, Splitting};
 use glam::Vec3;
