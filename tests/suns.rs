@@ -78,7 +78,7 @@ fn the_sun_is_found() {
     let environment = environment();
     assert_eq!(environment.as_view().suns().len(), 1);
     let power = f64::from(environment.as_view().suns()[0].power);
-    let flux = f64::from(environment.mean()) * 4.0 * std::f64::consts::PI;
+    let flux = f64::from(environment.mean()) * 4.0 * core::f64::consts::PI;
     assert!(power > 0.4 * flux && power < flux, "{power} of {flux}");
 }
 
