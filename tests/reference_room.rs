@@ -77,6 +77,7 @@ fn check_mean(film: &Film, reference: &Reference) {
         error.abs().cmple(tolerance).all(),
         "the mean's relative error is {error}, with a tolerance of {tolerance}"
     );
+    assert!(error.abs().max_element() < 0.005, "the mean is off by more than half a percent");
     assert!(tolerance.max_element() < 0.02, "too noisy to tell");
 }
 
