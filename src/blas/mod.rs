@@ -17,9 +17,6 @@ mod pyramid;
 mod texture;
 mod touched;
 
-#[cfg(test)]
-mod pcg;
-
 pub(crate) use barycentric::Lattice;
 pub(crate) use build::build;
 pub(crate) use cell::Cell;

@@ -98,13 +98,13 @@ impl<'a> Prepared<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blas::pcg::Pcg;
+    use crate::testing::Pcg32;
 
     #[test]
     fn whole_image_of_any_size() {
-        let mut rng = Pcg::new(1, 1);
+        let mut rng = Pcg32::new(1, 1);
         for (w, h) in [(1, 1), (1, 37), (5, 3), (64, 64), (33, 7)] {
-            let texels: Vec<f32> = (0..w * h).map(|_| rng.f32()).collect();
+            let texels: Vec<f32> = (0..w * h).map(|_| rng.next_f32()).collect();
             let prepared = Prepared::new(Texture::new(w, h, &texels).unwrap());
             let whole = prepared.whole();
             let mean = texels.iter().map(|&t| f64::from(t)).sum::<f64>() / texels.len() as f64;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::blas::pcg::Pcg;
+use crate::testing::Pcg32;
 
 /// Ogaki's formula in exact arithmetic, for points that are not on an inner edge.
 fn talk_index(local: [u32; 3], size: u32, r: u32) -> usize {
@@ -48,7 +48,7 @@ fn numbering_of_four_is_corners_and_middle() {
 
 /// Down a random path of cells, a point strictly inside of the last cell is looked up along the same path.
 fn paths<const M: usize>(seed: u64) {
-    let mut rng = Pcg::new(seed, 3);
+    let mut rng = Pcg32::new(seed, 3);
     let levels = MAX_DEPTH / level_halvings::<M>();
     for _ in 0..2000 {
         let mut cell = Cell::root();
@@ -58,7 +58,7 @@ fn paths<const M: usize>(seed: u64) {
             cell = cell.child::<M>(*index);
         }
         assert!(cell.size >= 16);
-        let inner = interior_point(cell.size, [f64::from(rng.f32()), f64::from(rng.f32())]);
+        let inner = interior_point(cell.size, [f64::from(rng.next_f32()), f64::from(rng.next_f32())]);
         assert!(inner.iter().all(|&j| j >= 1) && inner.iter().sum::<u32>() == cell.size);
         let point = cell.global(inner);
         assert_eq!(point.0.iter().sum::<u32>(), LATTICE);
@@ -86,7 +86,7 @@ fn paths_are_found_again() {
 
 /// Any point, edges and corners included, is in a cell at every depth, and in one that really holds it.
 fn everywhere<const M: usize>() {
-    let mut rng = Pcg::new(9, 1);
+    let mut rng = Pcg32::new(9, 1);
     let mut points = alloc::vec![[LATTICE, 0, 0], [0, LATTICE, 0], [0, 0, LATTICE]];
     for _ in 0..2000 {
         // Coarse coordinates fall onto edges and corners of cells.

@@ -5,7 +5,7 @@ use glam::Vec2;
 
 use super::tests::{FILTERS, LOWER, UPPER};
 use super::*;
-use crate::blas::pcg::Pcg;
+use crate::testing::Pcg32;
 
 /// The texture coordinates of the quad's two triangles; images have `v` downwards.
 fn quad() -> [[Vec2; 3]; 2] {
@@ -35,8 +35,8 @@ fn golden() {
 
 /// Eight bright discs on a dark ground.
 fn spots(n: usize) -> Vec<f32> {
-    let mut rng = Pcg::new(7, 7);
-    let centres: [[f32; 2]; 8] = core::array::from_fn(|_| [rng.f32(), rng.f32()]);
+    let mut rng = Pcg32::new(7, 7);
+    let centres: [[f32; 2]; 8] = core::array::from_fn(|_| [rng.next_f32(), rng.next_f32()]);
     let at = |i: usize| (i as f32 + 0.5) / n as f32;
     (0..n * n)
         .map(|i| {
@@ -71,8 +71,8 @@ fn sizes_and_times() {
     measure::<4>("spots-512", texture, &quad);
     measure::<16>("spots-512", texture, &quad);
     measure::<64>("spots-512", texture, &quad);
-    let mut rng = Pcg::new(1, 1);
-    let noise: Vec<f32> = (0..1024 * 1024).map(|_| rng.f32()).collect();
+    let mut rng = Pcg32::new(1, 1);
+    let noise: Vec<f32> = (0..1024 * 1024).map(|_| rng.next_f32()).collect();
     for filter in FILTERS {
         let texture = Texture::new(512, 512, &noise[..512 * 512]).unwrap().filter(filter);
         measure::<4>("noise-512", texture, &quad);

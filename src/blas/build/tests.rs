@@ -3,8 +3,8 @@ use glam::Vec2;
 use super::*;
 use crate::blas::barycentric::{Lattice, child, interior_point};
 use crate::blas::node::{validate, validate_roots};
-use crate::blas::pcg::Pcg;
 use crate::record::Filter;
+use crate::testing::Pcg32;
 
 const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 pub(super) const FILTERS: [Filter; 2] = [Filter::Nearest, Filter::Bilinear];
@@ -31,8 +31,8 @@ fn host(texture: &Texture<'_>, uv: [Vec2; 3], b: [f32; 2]) -> f32 {
     texture.value(p.x, p.y)
 }
 
-fn random_barycentrics(rng: &mut Pcg) -> [f32; 2] {
-    let [x, y] = [rng.f32(), rng.f32()];
+fn random_barycentrics(rng: &mut Pcg32) -> [f32; 2] {
+    let [x, y] = [rng.next_f32(), rng.next_f32()];
     let b = if x + y > 1.0 { [1.0 - x, 1.0 - y] } else { [x, y] };
     match rng.below(8) {
         0 => [b[0], 0.0],
@@ -62,7 +62,7 @@ fn check<const M: usize>(texture: Texture<'_>, uv: [Vec2; 3], points: u32) -> us
             }
         }
     }
-    let mut rng = Pcg::new(11, 4);
+    let mut rng = Pcg32::new(11, 4);
     for _ in 0..points {
         let b = random_barycentrics(&mut rng);
         if host(&texture, uv, b) > 0.0 {
@@ -73,13 +73,13 @@ fn check<const M: usize>(texture: Texture<'_>, uv: [Vec2; 3], points: u32) -> us
     pool.len() - 3
 }
 
-fn random_uv(rng: &mut Pcg, scale: f32) -> [Vec2; 3] {
-    core::array::from_fn(|_| Vec2::new(scale * (2.0 * rng.f32() - 1.0), scale * (2.0 * rng.f32() - 1.0)))
+fn random_uv(rng: &mut Pcg32, scale: f32) -> [Vec2; 3] {
+    core::array::from_fn(|_| Vec2::new(scale * (2.0 * rng.next_f32() - 1.0), scale * (2.0 * rng.next_f32() - 1.0)))
 }
 
 #[test]
 fn one_bright_texel_is_never_lost() {
-    let mut rng = Pcg::new(21, 4);
+    let mut rng = Pcg32::new(21, 4);
     for round in 0..150 {
         let (w, h) = (1 + rng.below(12) as usize, 1 + rng.below(12) as usize);
         let mut texels = alloc::vec![0.0; w * h];
@@ -103,8 +103,8 @@ fn one_bright_texel_is_never_lost() {
 
 #[test]
 fn averages_at_the_root_are_those_of_the_image() {
-    let mut rng = Pcg::new(22, 4);
-    let texels: Vec<f32> = (0..64 * 64).map(|_| rng.f32()).collect();
+    let mut rng = Pcg32::new(22, 4);
+    let texels: Vec<f32> = (0..64 * 64).map(|_| rng.next_f32()).collect();
     let mean = texels.iter().map(|&t| f64::from(t)).sum::<f64>() / texels.len() as f64;
     for filter in FILTERS {
         let prepared = Prepared::new(Texture::new(64, 64, &texels).unwrap().filter(filter));
@@ -125,7 +125,7 @@ fn black_stays_black() {
     let prepared = Prepared::new(texture);
     let mut pool = Vec::new();
     let root = build::<4>(&prepared, LOWER, &mut pool).unwrap();
-    let mut rng = Pcg::new(1, 9);
+    let mut rng = Pcg32::new(1, 9);
     for _ in 0..10_000 {
         let b = random_barycentrics(&mut rng);
         let u = b[0] + b[1];
@@ -149,9 +149,9 @@ fn constant_images_need_no_nodes() {
 
 #[test]
 fn arities_agree() {
-    let mut rng = Pcg::new(23, 4);
+    let mut rng = Pcg32::new(23, 4);
     for filter in FILTERS {
-        let texels: Vec<f32> = (0..40 * 24).map(|_| rng.f32()).collect();
+        let texels: Vec<f32> = (0..40 * 24).map(|_| rng.next_f32()).collect();
         let prepared = Prepared::new(Texture::new(40, 24, &texels).unwrap().filter(filter));
         let uv = random_uv(&mut rng, 1.0);
         let (mut four, mut sixteen) = (Vec::new(), Vec::new());
@@ -159,7 +159,7 @@ fn arities_agree() {
         let root16 = build::<16>(&prepared, uv, &mut sixteen).unwrap();
         for _ in 0..500 {
             // Strictly inside of all cells, so that both see the same ones.
-            let inner = interior_point(LATTICE, [f64::from(rng.f32()), f64::from(rng.f32())]);
+            let inner = interior_point(LATTICE, [f64::from(rng.next_f32()), f64::from(rng.next_f32())]);
             let b = Lattice(inner).to_barycentrics();
             let (a, c) = (path(root4, &four, b), path(root16, &sixteen, b));
             for (x, y) in a.iter().step_by(2).zip(&c) {
@@ -171,8 +171,8 @@ fn arities_agree() {
 
 #[test]
 fn extreme_coordinates() {
-    let mut rng = Pcg::new(24, 4);
-    let texels: Vec<f32> = (0..64 * 64).map(|i| if i % 37 == 0 { rng.f32() } else { 0.0 }).collect();
+    let mut rng = Pcg32::new(24, 4);
+    let texels: Vec<f32> = (0..64 * 64).map(|i| if i % 37 == 0 { rng.next_f32() } else { 0.0 }).collect();
     for wrap in WRAPS {
         for filter in FILTERS {
             let texture = Texture::new(64, 64, &texels).unwrap().filter(filter).wrap(wrap, wrap);
@@ -208,8 +208,8 @@ fn long_images() {
 /// A triangle over a million copies of an image keeps to its budget.
 #[test]
 fn budget() {
-    let mut rng = Pcg::new(25, 4);
-    let texels: Vec<f32> = (0..128 * 128).map(|_| rng.f32()).collect();
+    let mut rng = Pcg32::new(25, 4);
+    let texels: Vec<f32> = (0..128 * 128).map(|_| rng.next_f32()).collect();
     let texture = Texture::new(128, 128, &texels).unwrap();
     let nodes = check::<4>(texture, LOWER.map(|p| p * 10.0), 1000);
     assert!(nodes * 3 <= 1 << 16 && nodes * 3 > 1 << 15, "{nodes}");
