@@ -41,8 +41,10 @@ const USAGE: &str = "cargo bench --bench quality -- [--quick] [--json FILE] [--p
 impl Args {
     /// Reads the command line; ignores what cargo adds.
     pub(crate) fn parse() -> Result<Self, String> {
-        let mut args =
-            Self { effort: Effort::FULL, quick: false, json: None, plots: None, workloads: vec![], methods: vec![] };
+        // `cargo bench` says so; `cargo test` does not, and wants to see it run once.
+        let is_bench = std::env::args().any(|word| word == "--bench");
+        let effort = if is_bench { Effort::FULL } else { Effort::SMOKE };
+        let mut args = Self { effort, quick: !is_bench, json: None, plots: None, workloads: vec![], methods: vec![] };
         let mut words = std::env::args().skip(1);
         while let Some(word) = words.next() {
             let mut value = || words.next().ok_or_else(|| format!("{word} needs a value\n{USAGE}"));
