@@ -200,6 +200,6 @@ fn sum_up<const M: usize>(pool: &mut [Node<M>], start: usize) -> f32 {
 }
 
 #[cfg(test)]
-mod sizes;
+mod golden;
 #[cfg(test)]
 mod tests;

@@ -77,11 +77,6 @@ impl<const N: usize> Node<N> {
         weights
     }
 
-    /// Weight of one child, but for the least share that [`Self::weights`] grants it.
-    pub(super) fn is_possible(&self, lane: usize, x: &ShadingPoint, scene: &impl Scene) -> bool {
-        self.weights(x, scene)[lane] > 0.0
-    }
-
     /// The geometric terms of all lanes, in plain loops over arrays that a compiler can turn into vectors.
     #[inline(always)]
     fn terms(&self, x: &ShadingPoint) -> Terms<N> {

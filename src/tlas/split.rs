@@ -52,25 +52,29 @@ impl<const N: usize> TlasView<'_, N> {
         // Depth first through the split nodes, without a stack: from a finished node on to the next lane above it.
         let (mut node, mut lane, mut depth) = (0, 0, 0);
         let mut arriving = true;
+        let mut weights = [0.0; N];
         loop {
-            if arriving && !(depth < splitting.levels && self.is_split(node, x, &measure)) {
+            if arriving && depth < splitting.levels && self.is_split(node, x, &measure) {
+                weights = self.nodes[node].weights(x, scene);
+            } else if arriving {
                 if let Some((leaf, count)) = self.sample_below(node, x, scene, &mut variate(draws)) {
                     visit(leaf, count);
                 }
                 draws += 1;
                 lane = N;
             }
+            arriving = false;
             if lane == N {
                 let Some((parent, from)) = self.parents[node].get::<N>() else { return };
-                (node, lane, depth, arriving) = (parent, from + 1, depth - 1, false);
+                (node, lane, depth) = (parent, from + 1, depth - 1);
+                weights = self.nodes[node].weights(x, scene);
                 continue;
             }
-            arriving = false;
             match self.nodes[node].child(lane) {
-                Child::Node(index) if self.nodes[node].is_possible(lane, x, scene) => {
+                Child::Node(index) if weights[lane] > 0.0 => {
                     (node, lane, depth, arriving) = (index as usize, 0, depth + 1, true);
                 }
-                Child::Leaf(leaf) if self.nodes[node].is_possible(lane, x, scene) => {
+                Child::Leaf(leaf) if weights[lane] > 0.0 => {
                     visit(leaf, 1.0);
                     lane += 1;
                 }

@@ -3,7 +3,6 @@
 mod building;
 mod bytes;
 mod sampling;
-mod timing;
 
 use super::Environment;
 use crate::record::Filter;

@@ -176,24 +176,3 @@ fn no_path_moves_faster_than_the_stretch() {
     }
     assert!(worst > 0.4 && worst < 0.98 * f64::from(STRETCH), "{worst}");
 }
-
-/// Timings: `cargo test --release --lib equal_area -- --ignored --nocapture`.
-#[test]
-#[ignore = "prints timings"]
-fn timing() {
-    let mut pcg = Pcg32::new(1, 1);
-    let points: alloc::vec::Vec<Vec2> = (0..4096).map(|_| Vec2::new(pcg.next_f32(), pcg.next_f32())).collect();
-    let directions: alloc::vec::Vec<Vec3> = points.iter().map(|&p| square_to_sphere(p)).collect();
-    let ns = |f: &mut dyn FnMut()| {
-        let start = std::time::Instant::now();
-        for _ in 0..500 {
-            f();
-        }
-        start.elapsed().as_nanos() as f64 / 500.0 / 4096.0
-    };
-    let mut sum = Vec3::ZERO;
-    let a = ns(&mut || points.iter().for_each(|&p| sum += core::hint::black_box(square_to_sphere(p))));
-    let mut total = Vec2::ZERO;
-    let b = ns(&mut || directions.iter().for_each(|&d| total += core::hint::black_box(sphere_to_square(d))));
-    std::println!("square_to_sphere {a:.2} ns, sphere_to_square {b:.2} ns ({sum} {total})");
-}
