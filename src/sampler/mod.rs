@@ -3,6 +3,7 @@
 mod builder;
 mod bytes;
 mod direction;
+mod emission;
 mod lights;
 mod mesh;
 mod pdf;
@@ -11,5 +12,6 @@ mod split;
 mod suns;
 
 pub use builder::LightSamplerBuilder;
+pub use emission::{Emission, EmissionSample};
 pub use lights::{LightSampler, LightSamplerView};
 pub use mesh::{Mesh, Sides, TextureId, Weight};

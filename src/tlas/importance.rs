@@ -142,6 +142,6 @@ impl<const N: usize> Node<N> {
 /// Expectation of `max(0, X)` for a normal variable of this mean and variance, within 4 % of the standard deviation:
 /// exact at a mean of zero and far from it.
 #[inline(always)]
-fn clamped_mean(mean: f32, variance: f32) -> f32 {
+pub(super) fn clamped_mean(mean: f32, variance: f32) -> f32 {
     0.5 * (mean + math::sqrt(mean * mean + core::f32::consts::FRAC_2_PI * variance))
 }

@@ -3,6 +3,7 @@
 //! It sees bounds and opaque leaf numbers only; what a leaf is, and what light arrives from behind a portal, it
 //! asks of the level above through [`Scene`].
 
+mod beam;
 mod build;
 mod collapse;
 mod descend;
@@ -14,6 +15,7 @@ mod split;
 mod tests;
 mod validate;
 
+pub(crate) use beam::{Beam, Outgoing};
 pub(crate) use build::build;
 pub(crate) use importance::Scene;
 pub(crate) use node::{MAX_LEAVES, Tlas, TlasView};
