@@ -135,6 +135,7 @@ pub use error::Error;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
 pub use sampler::{
-    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Sides, TextureId, Weight,
+    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, PointSampler, Sides,
+    TextureId, Weight,
 };
 pub use tlas::Splitting;

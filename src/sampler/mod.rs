@@ -1,9 +1,11 @@
 //! The facade that a host calls.
 
+mod at;
 mod builder;
 mod bytes;
 mod direction;
 mod emission;
+mod forward;
 mod lights;
 mod mesh;
 mod pdf;
@@ -11,6 +13,7 @@ mod sample;
 mod split;
 mod suns;
 
+pub use at::PointSampler;
 pub use builder::LightSamplerBuilder;
 pub use emission::{Emission, EmissionSample};
 pub use lights::{LightSampler, LightSamplerView};
