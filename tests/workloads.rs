@@ -69,7 +69,7 @@ fn window() {
 
 #[test]
 fn clip_maps_are_what_holes_are() {
-    for (holes, clip) in [("grid-1", "grid-1-clip"), ("grid-100", "grid-100-clip")] {
+    for (holes, clip) in [("grid-1", "grid-1@clip-map"), ("grid-100", "grid-100@clip-map")] {
         let (holes, clip) = (irradiances(&scenes::scene(holes)), irradiances(&scenes::scene(clip)));
         assert_close(&clip, &holes, 1e-5);
     }
@@ -103,7 +103,7 @@ fn shaded_points(scene: &Scene) -> (Vec<ShadingPoint>, Vec<f64>) {
 #[test]
 fn irradiance_through_openings() {
     // The grid is coarse where an opening is small or has a jagged edge.
-    let tolerances = [("window", 1e-4), ("star", 1e-2), ("star-nearest", 1e-2), ("grid-100", 1e-2), ("nested", 3e-2)];
+    let tolerances = [("window", 1e-4), ("star", 1e-2), ("star@nearest", 1e-2), ("grid-100", 1e-2), ("nested", 3e-2)];
     for (name, tolerance) in tolerances {
         let scene = scenes::scene(name);
         let (points, found) = shaded_points(&scene);

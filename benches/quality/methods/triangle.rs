@@ -11,6 +11,9 @@ use super::{Drawn, Method};
 use crate::oracle::lambert::solid_angle;
 use crate::scenes::Scene;
 
+/// Number of lights up to which it is quick to look at every one.
+const FEW: usize = 200;
+
 /// How a triangle is chosen.
 pub(crate) enum Choice {
     Power(Power),
@@ -126,7 +129,7 @@ impl<'a> ThenPoint<'a> {
 }
 
 /// Density per solid angle of a uniform density over the area: `d² / (A cos θ)`.
-fn area_density(vertices: &[DVec3; 3], direction: DVec3) -> f64 {
+pub(super) fn area_density(vertices: &[DVec3; 3], direction: DVec3) -> f64 {
     let [a, b, c] = *vertices;
     let double_normal = (b - a).cross(c - a);
     let double_area = double_normal.length();
@@ -137,7 +140,7 @@ fn area_density(vertices: &[DVec3; 3], direction: DVec3) -> f64 {
 }
 
 /// Whether the origin sees the front of a triangle.
-fn front(vertices: &[DVec3; 3]) -> bool {
+pub(super) fn front(vertices: &[DVec3; 3]) -> bool {
     let [a, b, c] = *vertices;
     (b - a).cross(c - a).dot(a) < 0.0
 }
@@ -193,6 +196,6 @@ impl Method for ThenPoint<'_> {
     }
 
     fn is_slow(&self) -> bool {
-        matches!(self.choice, Choice::Every(_))
+        matches!(self.choice, Choice::Every(_)) && self.triangles.len() > FEW
     }
 }

@@ -24,7 +24,17 @@ pub(crate) struct Sky {
 }
 
 impl Sky {
+    /// The sky of the workloads.
     pub(crate) fn new() -> Self {
+        Self::with_sun(is_sun)
+    }
+
+    /// The same sky at another time.
+    pub(crate) fn without_sun() -> Self {
+        Self::with_sun(|_| false)
+    }
+
+    fn with_sun(is_sun: impl Fn(DVec3) -> bool) -> Self {
         let center = |i: usize| (i as f64 + 0.5) / SIZE as f64;
         let direction = |k: usize| square_to_sphere(DVec2::new(center(k % SIZE), center(k / SIZE)));
         let texels: Vec<f32> = (0..SIZE * SIZE)
