@@ -1,6 +1,6 @@
 //! What is counted.
 
-use std::hint::black_box;
+use core::hint::black_box;
 
 use fanlight::{
     Environment, LightSample, LightSampler, LightSamplerBuilder, Mesh, ShadingPoint, Splitting, Texture, Weight,

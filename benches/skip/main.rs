@@ -7,7 +7,7 @@
 #[path = "../quality/scenes/mod.rs"]
 mod scenes;
 
-use std::hint::black_box;
+use core::hint::black_box;
 use std::time::Instant;
 
 use fanlight::{Environment, Filter, LightSampler, Mesh, ShadingPoint, Texture, Weight};

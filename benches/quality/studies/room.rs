@@ -47,7 +47,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 /// One curve for each strategy.
 fn curves(world: &World, window: &str, bounces: u32, longest: f64) -> Vec<Series> {
     let render = |strategy: Strategy, seed: u32, seconds: f64| -> (Film, f64) {
-        let tracer = PathTracer { world, strategy, bounces };
+        let tracer = PathTracer::new(world, strategy, bounces);
         Progressive { tracer, camera: Camera::scaled(1), seed }.render(Budget::Seconds(seconds), |_| ())
     };
     let reference = render(Strategy::EnvironmentAndPortals, u32::MAX, REFERENCE * longest).0;
