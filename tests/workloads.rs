@@ -50,6 +50,17 @@ fn sphere() {
 }
 
 #[test]
+fn sphere_with_spots() {
+    let scene = scenes::scene("sphere-9-spots");
+    assert_eq!(scene.lights.len(), 972);
+    let image = scene.image.expect("the sphere is textured");
+    assert_eq!(image.size, 256);
+    // Eight discs of radius 0.02, by the number of their texels.
+    let bright = image.texels.iter().filter(|texel| **texel == 100.0).count() as f64 / 65_536.0;
+    assert_close(&[bright], &[8.0 * core::f64::consts::PI * 0.02 * 0.02], 0.1);
+}
+
+#[test]
 fn quad() {
     let expected = [0.121_285_4, 0.114_489_3, 0.007_956_743, 0.0, 0.051_845_7];
     assert_close(&irradiances(&scenes::scene("quad")), &expected, 1e-4);

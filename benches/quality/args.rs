@@ -19,7 +19,9 @@ pub(crate) struct Effort {
     pub(crate) study_points: usize,
     /// Independent repetitions in a study.
     pub(crate) repetitions: usize,
-    /// Seconds that the longest image is rendered.
+    /// Images of a curve of error against time; each takes twice as long as the one before.
+    pub(crate) images: u32,
+    /// Seconds that the last of them is rendered.
     pub(crate) seconds: f64,
 }
 
@@ -32,6 +34,7 @@ impl Effort {
         choices: 20_000_000,
         study_points: 100,
         repetitions: 256,
+        images: 6,
         seconds: 8.0,
     };
     const QUICK: Self = Self {
@@ -42,7 +45,8 @@ impl Effort {
         choices: 1_000_000,
         study_points: 20,
         repetitions: 64,
-        seconds: 1.0,
+        images: 4,
+        seconds: 0.5,
     };
     const SMOKE: Self = Self {
         points: 8,
@@ -52,6 +56,7 @@ impl Effort {
         choices: 30_000,
         study_points: 2,
         repetitions: 4,
+        images: 1,
         seconds: 0.01,
     };
 }
@@ -90,15 +95,15 @@ pub(crate) struct Args {
 
 const USAGE: &str = "cargo bench --bench quality -- [--quick] [--json FILE] [--plots DIR] [--workload W]... \
                      [--method M]... [--points N] [--samples N] \
-                     [--stratification] [--splitting] [--lobes] [--room] [--everything]";
+                     [--table] [--stratification] [--splitting] [--lobes] [--room] [--everything]";
 
 impl Args {
     /// Reads the command line; ignores what cargo adds.
     pub(crate) fn parse() -> Result<Self, String> {
         // `cargo bench` says so; `cargo test` does not, and wants to see everything run once.
         let is_bench = std::env::args().any(|word| word == "--bench");
-        let (effort, parts) = if is_bench { (Effort::FULL, vec![]) } else { (Effort::SMOKE, Part::ALL.to_vec()) };
-        let (json, plots, workloads, methods) = (None, None, vec![], vec![]);
+        let effort = if is_bench { Effort::FULL } else { Effort::SMOKE };
+        let (parts, json, plots, workloads, methods) = (vec![], None, None, vec![], vec![]);
         let mut args = Self { effort, quick: !is_bench, parts, json, plots, workloads, methods };
         let mut words = std::env::args().skip(1);
         while let Some(word) = words.next() {
@@ -113,6 +118,7 @@ impl Args {
                 "--method" => args.methods.push(value()?),
                 "--points" => args.effort.points = number(&value()?)?,
                 "--samples" => args.effort.samples = number(&value()?)?,
+                "--table" => args.parts.push(Part::Table),
                 "--stratification" => args.parts.push(Part::Stratification),
                 "--splitting" => args.parts.push(Part::Splitting),
                 "--lobes" => args.parts.push(Part::Lobes),
@@ -122,7 +128,7 @@ impl Args {
             }
         }
         if args.parts.is_empty() {
-            args.parts.push(Part::Table);
+            args.parts = if is_bench { vec![Part::Table] } else { Part::ALL.to_vec() };
         }
         Ok(args)
     }

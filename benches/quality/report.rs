@@ -103,8 +103,7 @@ pub(crate) fn json(rows: &[Row]) -> String {
 }
 
 fn object(row: &Row) -> String {
-    let number =
-        |value: Option<f64>| value.filter(|v| v.is_finite()).map_or_else(|| "null".into(), |v| format!("{v:e}"));
+    let number = |value: Option<f64>| value.filter(|v| v.is_finite()).map_or_else(|| "null".into(), |v| v.to_string());
     let mut out =
         format!("  {{\"workload\": \"{}\", \"method\": \"{}\", \"class\": \"{}\"", row.workload, row.method, row.class);
     let figures = [

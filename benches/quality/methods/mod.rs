@@ -13,6 +13,7 @@ mod talk;
 mod tessellated;
 mod texel_cdf;
 mod triangle;
+mod wide_tree;
 
 use ::fanlight::{Illumination, ShadingPoint};
 use glam::Vec3;
@@ -72,8 +73,8 @@ pub(crate) trait Method: Sync {
 /// Methods that are run on a workload, or a variant of it, by default.
 pub(crate) fn names(workload: &str) -> &'static [&'static str] {
     match workload {
-        "cloud-10000" | "sphere-29" => &["fanlight", "power", "binary-tree", "every-light"],
-        "cloud-100000" => &["fanlight", "power", "binary-tree"],
+        "cloud-10000" | "sphere-29" => &["fanlight", "talk-tree", "power", "binary-tree", "every-light"],
+        "cloud-100000" => &["fanlight", "talk-tree", "power", "binary-tree"],
         "quad" => &[
             "fanlight",
             "talk-conservative",
@@ -137,6 +138,11 @@ pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
             Box::new(ThenPoint::new(scene, triangle::best_choice(scene), OnTriangle::SolidAngle))
         }
         "uniform-area" => Box::new(ThenPoint::new(scene, triangle::best_choice(scene), OnTriangle::Area)),
+        "talk-tree" => {
+            let binary = binary_tree::BinaryTree::new(&binary_tree::scene_bounds(scene));
+            let choice = Choice::Wide(wide_tree::WideTree::new(&binary));
+            Box::new(ThenPoint::new(scene, choice, OnTriangle::SolidAngle))
+        }
         "every-light" => {
             let choice = Choice::Every(every_light::EveryLight::new(scene));
             Box::new(ThenPoint::new(scene, choice, OnTriangle::SolidAngle))

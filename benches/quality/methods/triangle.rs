@@ -7,6 +7,7 @@ use super::arvo::{SphericalTriangle, barycentrics, crosses};
 use super::binary_tree::{BinaryTree, scene_bounds};
 use super::every_light::EveryLight;
 use super::power::Power;
+use super::wide_tree::WideTree;
 use super::{Drawn, Method};
 use crate::oracle::lambert::solid_angle;
 use crate::scenes::Scene;
@@ -18,6 +19,8 @@ const FEW: usize = 200;
 pub(crate) enum Choice {
     Power(Power),
     Tree(BinaryTree),
+    /// The talk's, by the conservative term.
+    Wide(WideTree),
     Every(EveryLight),
     /// In proportion to the solid angles: uniform over an opening of two triangles.
     SolidAngle,
@@ -90,6 +93,7 @@ impl<'a> ThenPoint<'a> {
         match &self.choice {
             Choice::Power(power) => Some(power.table.sample(u)),
             Choice::Tree(tree) => tree.sample(x, &mut f64::from(u)),
+            Choice::Wide(tree) => tree.sample(f64::from(u), |bounds| bounds.one_sided_importance(x)),
             Choice::Every(every) => every.sample(x, u),
             Choice::SolidAngle => {
                 let second = self.second_share(x);
@@ -103,6 +107,7 @@ impl<'a> ThenPoint<'a> {
         match &self.choice {
             Choice::Power(power) => power.table.pmf(light),
             Choice::Tree(tree) => tree.pmf(x, light),
+            Choice::Wide(tree) => tree.pmf(light, |bounds| bounds.one_sided_importance(x)),
             Choice::Every(every) => every.pmf(x, light),
             Choice::SolidAngle if light == 1 => self.second_share(x),
             Choice::SolidAngle => 1.0 - self.second_share(x),
@@ -189,6 +194,7 @@ impl Method for ThenPoint<'_> {
         let choice = match &self.choice {
             Choice::Power(power) => power.table.bytes(),
             Choice::Tree(tree) => tree.bytes(),
+            Choice::Wide(tree) => tree.bytes(),
             Choice::Every(every) => every.bytes(),
             Choice::SolidAngle => 0,
         };

@@ -9,8 +9,8 @@ use plotters::prelude::*;
 
 use crate::Failure;
 
-/// Distinguishable colours (Okabe and Ito 2008, and four darker ones).
-const COLORS: [RGBColor; 12] = [
+/// Distinguishable colours: those of Okabe and Ito (2008), and darker ones.
+const COLORS: [RGBColor; 14] = [
     RGBColor(0, 0, 0),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
@@ -23,6 +23,8 @@ const COLORS: [RGBColor; 12] = [
     RGBColor(130, 130, 130),
     RGBColor(140, 80, 40),
     RGBColor(60, 110, 60),
+    RGBColor(200, 40, 60),
+    RGBColor(40, 50, 120),
 ];
 const PANEL: (u32, u32) = (300, 250);
 const LEGEND_COLUMN: i32 = 225;
@@ -40,6 +42,8 @@ pub(crate) enum Style {
 /// The marks of one name.
 pub(crate) struct Series {
     pub(crate) name: String,
+    /// Draws rings instead of discs.
+    pub(crate) open: bool,
     pub(crate) marks: Vec<(f64, f64)>,
 }
 
@@ -56,6 +60,10 @@ pub(crate) struct Panels {
     /// Of the horizontal and the vertical axis.
     pub(crate) labels: [&'static str; 2],
     pub(crate) style: Style,
+    /// All names there are, in the order of their colours; those that appear in no panel are left out of the legend.
+    pub(crate) names: Vec<String>,
+    /// What rings stand for, if there are any.
+    pub(crate) open: &'static str,
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -66,43 +74,54 @@ impl Panels {
         if let Some(directory) = path.parent() {
             std::fs::create_dir_all(directory)?;
         }
-        let names = self.names();
+        let legend_entries = self.legend();
         let rows = self.panels.len().div_ceil(self.columns);
         let (width, height) = (PANEL.0 * self.columns as u32, PANEL.1 * rows as u32);
         let per_row = (width as i32 / LEGEND_COLUMN).max(1) as usize;
-        let legend_height = LEGEND_ROW * names.len().div_ceil(per_row) as i32 + 12;
+        let legend_height = LEGEND_ROW * legend_entries.len().div_ceil(per_row) as i32 + 12;
         let root = SVGBackend::new(path, (width, height + legend_height as u32)).into_drawing_area();
         root.fill(&WHITE)?;
         let (charts, legend) = root.split_vertically(height);
         for (panel, area) in self.panels.iter().zip(charts.split_evenly((rows, self.columns))) {
-            self.draw_panel(panel, &area, &names)?;
+            self.draw_panel(panel, &area)?;
         }
-        for (i, name) in names.iter().enumerate() {
+        for (i, (name, style)) in legend_entries.into_iter().enumerate() {
             let at = ((i % per_row) as i32 * LEGEND_COLUMN + 20, (i / per_row) as i32 * LEGEND_ROW + 10);
-            legend.draw(&Circle::new(at, 4, color(i).filled()))?;
-            legend.draw(&Text::new(name.clone(), (at.0 + 10, at.1 - 7), ("sans-serif", 14)))?;
+            legend.draw(&Circle::new(at, 4, style))?;
+            legend.draw(&Text::new(name.to_owned(), (at.0 + 10, at.1 - 7), ("sans-serif", 14)))?;
         }
         root.present()?;
         Ok(())
     }
 
-    /// All names, in the order in which they first appear.
-    fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> = vec![];
-        for series in self.panels.iter().flat_map(|panel| &panel.series) {
-            if !names.contains(&series.name) {
-                names.push(series.name.clone());
-            }
+    /// Names that appear, and how.
+    fn legend(&self) -> Vec<(&str, ShapeStyle)> {
+        let all = || self.panels.iter().flat_map(|panel| &panel.series);
+        let appears = |name: &&String| all().any(|series| series.name == **name);
+        let mut entries: Vec<(&str, ShapeStyle)> =
+            self.names.iter().filter(appears).map(|name| (name.as_str(), self.color(name).filled())).collect();
+        if all().any(|series| series.open) {
+            entries.push((self.open, BLACK.stroke_width(2)));
         }
-        names
+        entries
     }
 
-    fn draw_panel(&self, panel: &Panel, area: &Area<'_>, names: &[String]) -> Result<(), Failure> {
+    fn color(&self, name: &str) -> RGBColor {
+        COLORS[self.names.iter().position(|n| n == name).unwrap_or(0) % COLORS.len()]
+    }
+
+    /// Horizontal range: that of all panels.
+    fn horizontal(&self) -> Range<f64> {
+        let series = self.panels.iter().flat_map(|panel| &panel.series);
+        span(series.flat_map(|series| &series.marks).filter(|m| is_positive(**m)).map(|mark| mark.0))
+    }
+
+    fn draw_panel(&self, panel: &Panel, area: &Area<'_>) -> Result<(), Failure> {
         let marks = || panel.series.iter().flat_map(|series| series.marks.iter().copied()).filter(|m| is_positive(*m));
         if marks().next().is_none() {
             return Ok(());
         }
-        let (x, y) = (span(marks().map(|mark| mark.0)), span(marks().map(|mark| mark.1)));
+        let (x, y) = (self.horizontal(), span(marks().map(|mark| mark.1)));
         let mut chart = ChartBuilder::on(area)
             .caption(&panel.title, ("sans-serif", 16))
             .margin(6)
@@ -124,12 +143,13 @@ impl Panels {
             draw_equal_costs(&mut chart, &x, &y)?;
         }
         for series in &panel.series {
-            let color = color(names.iter().position(|name| *name == series.name).unwrap_or(0));
+            let color = self.color(&series.name);
             let marks: Vec<(f64, f64)> = series.marks.iter().copied().filter(|mark| is_positive(*mark)).collect();
             if self.style == Style::Lines {
                 chart.draw_series([PathElement::new(marks.clone(), color.stroke_width(2))])?;
             }
-            chart.draw_series(marks.into_iter().map(|mark| Circle::new(mark, 4, color.filled())))?;
+            let style = if series.open { color.stroke_width(2) } else { color.filled() };
+            chart.draw_series(marks.into_iter().map(|mark| Circle::new(mark, 4, style)))?;
         }
         Ok(())
     }
@@ -137,10 +157,6 @@ impl Panels {
 
 fn is_positive(mark: (f64, f64)) -> bool {
     mark.0 > 0.0 && mark.1 > 0.0 && mark.0.is_finite() && mark.1.is_finite()
-}
-
-fn color(i: usize) -> RGBColor {
-    COLORS[i % COLORS.len()]
 }
 
 /// An interval around values.

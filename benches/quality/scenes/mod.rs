@@ -37,7 +37,7 @@ pub(crate) const NAMES: [&str; 15] = [
     "nested",
 ];
 
-/// Name of a workload, and of its variant if it is not the first.
+/// Name of a workload (or method), and of its variant if it is not the first.
 pub(crate) fn workload_and_variant(name: &str) -> (&str, Option<&str>) {
     name.split_once('@').map_or((name, None), |(workload, variant)| (workload, Some(variant)))
 }

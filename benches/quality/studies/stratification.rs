@@ -28,13 +28,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             let [a, b, c, d] = variances.map(short);
             println!("{:26} {:24} {a:>9} {b:>9} {c:>9} {d:>9} {:>6.2}", case.name, input.name(), slope(&variances));
             let marks = COUNTS.iter().zip(variances).map(|(n, v)| (f64::from(*n), v)).collect();
-            series.push(Series { name: input.name().to_owned(), marks });
+            series.push(Series { name: input.name().to_owned(), open: false, marks });
         }
         panels.push(Panel { title: case.name.to_owned(), series });
     }
     if let Some(directory) = &args.plots {
-        let panels =
-            Panels { panels, columns: 3, labels: ["samples", "relative variance of their mean"], style: Style::Lines };
+        let names = Input::ALL.map(|input| input.name().to_owned()).to_vec();
+        let labels = ["samples", "relative variance of their mean"];
+        let panels = Panels { panels, columns: 3, labels, style: Style::Lines, names, open: "" };
         panels.draw(&directory.join("stratification.svg"))?;
     }
     Ok(())

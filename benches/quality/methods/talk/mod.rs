@@ -7,7 +7,6 @@
 mod averages;
 mod cell;
 mod pyramid;
-mod wide_tree;
 
 use ::fanlight::{Receiver, ShadingPoint};
 use glam::{DVec3, Vec3};
@@ -16,12 +15,12 @@ use super::arvo::{barycentrics, crosses};
 use super::binary_tree::{BinaryTree, scene_bounds};
 use super::light_bounds::LightBounds;
 use super::triangle::{area_density, front, uniform};
+use super::wide_tree::{WideTree, pick};
 use super::{Drawn, Method};
 use crate::scenes::{Scene, Weight};
 use averages::Averages;
 use cell::{Cell, follow};
 use pyramid::Pyramid;
-use wide_tree::WideTree;
 
 /// Deepest subdivision: where a point touches a portal, no cell is ever as small as a pixel.
 const MAX_DEPTH: u32 = 24;
@@ -183,19 +182,4 @@ fn defended(weights: [f32; 4], textures: [f32; 4]) -> [f32; 4] {
     let sum = |values: &[f32; 4]| values.iter().sum::<f32>();
     let defence = DEFENSIVE / (1.0 - DEFENSIVE) * sum(&weights) / sum(&textures).max(f32::MIN_POSITIVE);
     core::array::from_fn(|i| weights[i] + defence * textures[i])
-}
-
-/// Chooses in proportion, and rescales `u`.
-fn pick(weights: &[f32], total: f32, u: &mut f64) -> usize {
-    let mut target = *u * f64::from(total);
-    let mut chosen = 0;
-    for (i, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-        chosen = i;
-        if target < f64::from(weight) {
-            break;
-        }
-        target -= f64::from(weight);
-    }
-    *u = (target / f64::from(weights[chosen])).clamp(0.0, 1.0 - f64::EPSILON);
-    chosen
 }

@@ -68,15 +68,8 @@ fn reduced(level: &[[f32; 3]], n: usize, x: usize, y: usize) -> [f32; 3] {
 
 /// Clarberg's map with pbrt-v4's polynomial for the angle.
 fn square(direction: Vec3) -> Vec2 {
-    const POLYNOMIAL: [f32; 7] = [
-        0.406_758_57e-5,
-        0.636_226_5,
-        0.615_720_2e-2,
-        -0.247_333_73,
-        0.881_770_7e-1,
-        0.419_038_82e-1,
-        -0.251_390_97e-1,
-    ];
+    const POLYNOMIAL: [f32; 7] =
+        [4.067_586e-6, 0.636_226_5, 6.157_202e-3, -0.247_333_73, 0.088_177_07, 0.041_903_88, -0.025_139_097];
     let d = direction.abs();
     let r = (1.0 - d.z).max(0.0).sqrt();
     let (low, high) = (d.x.min(d.y), d.x.max(d.y));

@@ -1,7 +1,8 @@
-//! A binary light tree collapsed to arity 8: every wide node is a cut through the binary one.
+//! A binary light tree collapsed to arity 8, as in the talk (Ogaki 2020): every wide node is a cut through the binary
+//! one.
 
-use crate::methods::binary_tree::BinaryTree;
-use crate::methods::light_bounds::LightBounds;
+use super::binary_tree::BinaryTree;
+use super::light_bounds::LightBounds;
 
 const ARITY: usize = 8;
 
@@ -12,7 +13,7 @@ struct Lane {
     child: Result<u32, u32>,
 }
 
-pub(super) struct WideTree {
+pub(crate) struct WideTree {
     nodes: Vec<Vec<Lane>>,
     /// Where each light hangs.
     lights: Vec<(u32, u32)>,
@@ -21,7 +22,7 @@ pub(super) struct WideTree {
 }
 
 impl WideTree {
-    pub(super) fn new(binary: &BinaryTree) -> Self {
+    pub(crate) fn new(binary: &BinaryTree) -> Self {
         let mut tree = Self { nodes: vec![], lights: vec![], parents: vec![] };
         tree.collapse(binary, 0, (0, 0));
         tree
@@ -60,14 +61,14 @@ impl WideTree {
     }
 
     /// Draws a light in proportion to the importance at each node.
-    pub(super) fn sample(&self, mut u: f64, importance: impl Fn(&LightBounds) -> f32) -> Option<(usize, f64)> {
+    pub(crate) fn sample(&self, mut u: f64, importance: impl Fn(&LightBounds) -> f32) -> Option<(usize, f64)> {
         let (mut at, mut pmf) = (0, 1.0);
         loop {
             let (weights, total) = self.weights(at, &importance);
             if !(total > 0.0) {
                 return None;
             }
-            let chosen = super::pick(&weights, total, &mut u);
+            let chosen = pick(&weights, total, &mut u);
             pmf *= f64::from(weights[chosen] / total);
             match self.nodes[at][chosen].child {
                 Ok(node) => at = node as usize,
@@ -77,7 +78,7 @@ impl WideTree {
     }
 
     /// Probability of drawing a light.
-    pub(super) fn pmf(&self, light: usize, importance: impl Fn(&LightBounds) -> f32) -> f64 {
+    pub(crate) fn pmf(&self, light: usize, importance: impl Fn(&LightBounds) -> f32) -> f64 {
         let (mut node, mut lane) = self.lights[light];
         let mut pmf = 1.0;
         loop {
@@ -101,8 +102,23 @@ impl WideTree {
         (weights, weights.iter().sum())
     }
 
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         let nodes: usize = self.nodes.iter().map(|lanes| size_of_val(&lanes[..])).sum();
         nodes + size_of_val(&self.lights[..]) + size_of_val(&self.parents[..])
     }
+}
+
+/// Chooses in proportion, and rescales `u`.
+pub(super) fn pick(weights: &[f32], total: f32, u: &mut f64) -> usize {
+    let mut target = *u * f64::from(total);
+    let mut chosen = 0;
+    for (i, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+        chosen = i;
+        if target < f64::from(weight) {
+            break;
+        }
+        target -= f64::from(weight);
+    }
+    *u = (target / f64::from(weights[chosen])).clamp(0.0, 1.0 - f64::EPSILON);
+    chosen
 }
