@@ -14,11 +14,13 @@ mod cases;
 #[path = "../quality/scenes/mod.rs"]
 mod scenes;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
 type Error = Box<dyn core::error::Error>;
+
+/// Cases by name, and their counts.
+type Counts = Vec<(String, u64)>;
 
 /// How much a count may grow.
 const TOLERANCE: f64 = 0.05;
@@ -47,7 +49,7 @@ fn run() -> Result<ExitCode, Error> {
         cases::ALL.iter().for_each(cases::Case::run);
         return Ok(ExitCode::SUCCESS);
     }
-    let counts: BTreeMap<String, u64> =
+    let counts: Counts =
         cases::ALL.iter().map(|case| Ok((case.name.to_owned(), count(case)?))).collect::<Result<_, Error>>()?;
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/instructions/baseline.txt");
     if words.iter().any(|word| word == "--update") {
@@ -74,7 +76,7 @@ fn count(case: &cases::Case) -> Result<u64, Error> {
     Ok(total / cases::CALLS as u64)
 }
 
-fn read(path: &Path) -> Result<BTreeMap<String, u64>, Error> {
+fn read(path: &Path) -> Result<Counts, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let line = |line: &str| {
         let (name, count) = line.split_once(' ').ok_or("a line of the baseline is not a name and a count")?;
@@ -84,19 +86,23 @@ fn read(path: &Path) -> Result<BTreeMap<String, u64>, Error> {
 }
 
 /// Prints the counts next to the baseline's. Fails if one grew, or if the cases are not those of the baseline.
-fn compare(counts: &BTreeMap<String, u64>, baseline: &BTreeMap<String, u64>) -> Result<ExitCode, Error> {
+fn compare(counts: &[(String, u64)], baseline: &[(String, u64)]) -> Result<ExitCode, Error> {
     println!("{:32} {:>12} {:>12} {:>8}", "instructions a call", "baseline", "now", "change");
     let mut grown = vec![];
-    for (name, &now) in counts {
-        let before = *baseline.get(name).ok_or_else(|| format!("the baseline has no {name}: run with --update"))?;
-        let change = now as f64 / before as f64 - 1.0;
+    for (name, now) in counts {
+        let before = find(baseline, name).ok_or_else(|| format!("the baseline has no {name}: run with --update"))?;
+        let change = *now as f64 / before as f64 - 1.0;
         println!("{name:32} {before:>12} {now:>12} {:>+7.1}%", 100.0 * change);
         if change > TOLERANCE {
             grown.push(name.as_str());
         }
     }
-    if let Some(gone) = baseline.keys().find(|name| !counts.contains_key(*name)) {
+    if let Some((gone, _)) = baseline.iter().find(|(name, _)| find(counts, name).is_none()) {
         return Err(format!("the baseline's {gone} is not measured any more").into());
     }
     if grown.is_empty() { Ok(ExitCode::SUCCESS) } else { Err(format!("slower: {}", grown.join(", ")).into()) }
+}
+
+fn find(counts: &[(String, u64)], name: &str) -> Option<u64> {
+    counts.iter().find(|(candidate, _)| candidate == name).map(|(_, count)| *count)
 }
