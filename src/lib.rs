@@ -122,6 +122,7 @@ mod light;
 mod math;
 mod record;
 mod sampler;
+mod simd;
 #[cfg(test)]
 mod testing;
 mod tlas;

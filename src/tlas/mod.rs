@@ -7,6 +7,8 @@ mod beam;
 mod build;
 mod collapse;
 mod descend;
+mod encode;
+mod forest;
 mod importance;
 mod node;
 mod ray;
