@@ -134,5 +134,5 @@ pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSampl
 pub use error::Error;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
-pub use sampler::{LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Sides, TextureId, Weight};
+pub use sampler::{LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, PointSampler, Sides, TextureId, Weight};
 pub use tlas::Splitting;

@@ -1,8 +1,10 @@
 //! The facade that a host calls.
 
+mod at;
 mod builder;
 mod bytes;
 mod direction;
+mod forward;
 mod lights;
 mod mesh;
 mod pdf;
@@ -10,6 +12,7 @@ mod sample;
 mod split;
 mod suns;
 
+pub use at::PointSampler;
 pub use builder::LightSamplerBuilder;
 pub use lights::{LightSampler, LightSamplerView};
 pub use mesh::{Mesh, Sides, TextureId, Weight};
