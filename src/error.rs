@@ -10,6 +10,12 @@ use core::fmt;
 pub struct Error(pub(crate) Kind);
 
 impl Error {
+    /// Whether it is no mistake but the host's own wish, given by what it passed to
+    /// [`build_with`](crate::LightSamplerBuilder::build_with).
+    pub fn is_cancelled(&self) -> bool {
+        self.0 == Kind::Cancelled
+    }
+
     /// Bytes that hold, in the element `at` or at that offset, something else than they should.
     pub(crate) fn bytes(what: &'static str, at: usize, found: impl TryInto<u64>, expected: impl TryInto<u64>) -> Self {
         let (found, expected) = (found.try_into().unwrap_or(u64::MAX), expected.try_into().unwrap_or(u64::MAX));
@@ -51,6 +57,8 @@ pub(crate) enum Kind {
     UnknownTexture { mesh: usize, texture: usize, textures: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
+    /// A build that the host has cancelled.
+    Cancelled,
     /// Bytes that do not hold what they should.
     Bytes { what: &'static str, at: usize, found: u64, expected: u64 },
 }
@@ -93,6 +101,7 @@ impl fmt::Display for Error {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")
             }
             Kind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
+            Kind::Cancelled => write!(f, "the build was cancelled"),
             Kind::Bytes { what, at, found, expected } => {
                 write!(f, "bytes: {what} at {at} is {found:#x}, expected {expected:#x}")
             }

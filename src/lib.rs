@@ -117,6 +117,7 @@ mod error;
 mod geometry;
 mod light;
 mod math;
+mod parallel;
 mod record;
 mod sampler;
 #[cfg(test)]

@@ -4,8 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules by level. Those of one level never import each other.
-const LEVELS: [&[&str]; 5] =
-    [&["error", "math", "geometry"], &["record", "bounds", "warp"], &["env", "blas", "tlas"], &["light"], &["sampler"]];
+const LEVELS: [&[&str]; 5] = [
+    &["error", "math", "geometry", "parallel"],
+    &["record", "bounds", "warp"],
+    &["env", "blas", "tlas"],
+    &["light"],
+    &["sampler"],
+];
 /// The float functions stand in for those of the standard library, so geometry may have them although it is a sibling.
 const EXCEPTIONS: [(&str, &str); 1] = [("geometry", "math")];
 /// Not part of the house.

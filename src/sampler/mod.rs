@@ -3,6 +3,7 @@
 mod builder;
 mod bytes;
 mod direction;
+mod emission;
 mod lights;
 mod mesh;
 mod pdf;

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use super::build::BinaryNode;
 use super::node::{Child, Node, Slot, Spread, Tlas};
+use crate::bounds::{LightBounds, Moments};
 
 /// A wide node that waits for its children: its binary node, and the lane that refers to it.
 struct Pending {
@@ -12,8 +13,9 @@ struct Pending {
     parent: Slot,
 }
 
-/// Collapses a binary tree. Returns the wide tree with the lights in the order of its leaves, which follows the
-/// tree, so that the lights of one node are neighbours in memory.
+/// Collapses a binary tree. Returns the wide tree, whose nodes have no bounds yet, with the lights in the order of its
+/// leaves, which follows the tree, so that the lights of one node are neighbours in memory. The nodes below a node
+/// follow it, in the order of its lanes.
 pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u32>) {
     let mut tlas = Tlas { nodes: Vec::new(), parents: Vec::new(), spreads: Vec::new(), leaves: Vec::new() };
     let mut lights = Vec::with_capacity(binary.len() / 2 + 1);
@@ -22,27 +24,21 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
         lights.push(leaf.link);
         return (tlas, lights);
     }
-    let total = binary[0].bounds.energy();
-    let energies = leaf_moments(binary, total);
     let mut pending = Vec::from([Pending { binary: 0, parent: Slot::ROOT }]);
     while let Some(Pending { binary: root, parent }) = pending.pop() {
         let index = tlas.nodes.len();
         tlas.nodes.push(Node::empty());
         tlas.parents.push(parent);
-        tlas.spreads.push(energies[root]);
+        tlas.spreads.push(Spread::default());
         if let Some((node, lane)) = parent.get::<N>() {
-            tlas.nodes[node].set(lane, Child::Node(index as u32), &binary[root].bounds, &binary[root].moments);
+            tlas.nodes[node].set(lane, Child::Node(index as u32), &LightBounds::NONE, &Moments::NONE);
         }
         let mut cut = [0; N];
         let width = make_cut(binary, root, &mut cut);
         for (lane, &below) in cut[..width].iter().enumerate() {
             if binary[below].count == 1 {
-                tlas.nodes[index].set(
-                    lane,
-                    Child::Leaf(lights.len() as u32),
-                    &binary[below].bounds,
-                    &binary[below].moments,
-                );
+                let leaf = Child::Leaf(lights.len() as u32);
+                tlas.nodes[index].set(lane, leaf, &LightBounds::NONE, &Moments::NONE);
                 tlas.leaves.push(Slot::new::<N>(index, lane));
                 lights.push(binary[below].link);
             }
@@ -59,7 +55,7 @@ fn make_cut<const N: usize>(binary: &[BinaryNode], root: usize, cut: &mut [usize
     cut[0] = root;
     let mut width = 1;
     while width < N {
-        let error = |&lane: &usize| binary[cut[lane]].bounds.cost(0.0);
+        let error = |&lane: &usize| binary[cut[lane]].cost;
         let widest = (0..width)
             .filter(|&lane| binary[cut[lane]].count > 1)
             .max_by(|a, b| error(a).total_cmp(&error(b)).then(binary[cut[*a]].count.cmp(&binary[cut[*b]].count)));
@@ -71,23 +67,4 @@ fn make_cut<const N: usize>(binary: &[BinaryNode], root: usize, cut: &mut [usize
         width += 1;
     }
     width
-}
-
-/// Count, mean and variance of the leaves' energies, relative to `total`, below every binary node.
-fn leaf_moments(binary: &[BinaryNode], total: f32) -> Vec<Spread> {
-    // Sum and sum of squares, children before parents: a child always lies behind its parent.
-    let mut sums = Vec::from_iter(binary.iter().map(|node| {
-        let energy = f64::from(node.bounds.energy()) / f64::from(total);
-        (energy, energy * energy)
-    }));
-    for i in (0..binary.len()).rev().filter(|&i| binary[i].count > 1) {
-        let (left, right) = (sums[i + 1], sums[i + binary[i].link as usize]);
-        sums[i] = (left.0 + right.0, left.1 + right.1);
-    }
-    let spread = |(node, &(sum, squares)): (&BinaryNode, &(f64, f64))| {
-        let count = f64::from(node.count);
-        let mean = sum / count;
-        Spread { count: count as f32, mean: mean as f32, variance: (squares / count - mean * mean).max(0.0) as f32 }
-    };
-    binary.iter().zip(&sums).map(spread).collect()
 }

@@ -58,7 +58,10 @@ impl<const N: usize> Node<N> {
         for lane in 0..N {
             weights[lane] = flux[lane] * terms.geometry[lane];
         }
-        let mut possible = terms.geometry.map(|term| term > 0.0);
+        let mut possible = [false; N];
+        for lane in 0..N {
+            possible[lane] = terms.geometry[lane] > 0.0 && flux[lane] + portal[lane] > 0.0;
+        }
         for lane in 0..N {
             if terms.doubtful[lane]
                 && possible[lane]

@@ -3,11 +3,14 @@
 //! It sees bounds and opaque leaf numbers only; what a leaf is, and what light arrives from behind a portal, it
 //! asks of the level above through [`Scene`].
 
+mod bins;
 mod build;
 mod collapse;
 mod descend;
+mod fit;
 mod importance;
 mod node;
+mod progress;
 mod ray;
 mod split;
 #[cfg(test)]
@@ -17,4 +20,5 @@ mod validate;
 pub(crate) use build::build;
 pub(crate) use importance::Scene;
 pub(crate) use node::{MAX_LEAVES, Tlas, TlasView};
+pub(crate) use progress::Report;
 pub use split::Splitting;
