@@ -55,6 +55,12 @@ pub(crate) enum Kind {
     Weight { mesh: usize, value: f32, limit: f32 },
     /// A handle to a texture that this builder did not give out.
     UnknownTexture { mesh: usize, texture: usize, textures: usize },
+    /// A mesh that a sampler does not hold.
+    UnknownMesh { mesh: usize, meshes: usize },
+    /// A changed mesh of other triangles than before.
+    TriangleCount { mesh: usize, found: usize, expected: usize },
+    /// A triangle that is not in the tree, for it had no area, but would have to be.
+    Revived { mesh: usize, triangle: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -99,6 +105,13 @@ impl fmt::Display for Error {
             }
             Kind::UnknownTexture { mesh, texture, textures } => {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")
+            }
+            Kind::UnknownMesh { mesh, meshes } => write!(f, "mesh {mesh} was never added, this sampler has {meshes}"),
+            Kind::TriangleCount { mesh, found, expected } => {
+                write!(f, "mesh {mesh}: {found} triangles given, but it was added with {expected}")
+            }
+            Kind::Revived { mesh, triangle } => {
+                write!(f, "mesh {mesh}: triangle {triangle} has an area now, but had none when the sampler was built")
             }
             Kind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             Kind::Cancelled => write!(f, "the build was cancelled"),

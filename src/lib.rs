@@ -72,7 +72,8 @@
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
 //! - punctual lights: points, spots and directions without an extent.
-//! - updates of a built sampler, except that the environment can be turned.
+//! - updates of a built sampler, except that the environment can be turned, and that lights can move and change their
+//!   brightness ([`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
 //!
 //! # Units and measures
@@ -135,5 +136,5 @@ pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSampl
 pub use error::Error;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
-pub use sampler::{LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Sides, TextureId, Weight};
+pub use sampler::{LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, Sides, TextureId, Weight};
 pub use tlas::Splitting;

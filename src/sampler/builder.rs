@@ -5,15 +5,13 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use glam::Vec3;
-
 use super::emission::Emission;
-use super::lights::{LightSampler, NO_LEAF};
-use super::mesh::{Kind, Mesh, Sides, TextureId, Weight};
+use super::lights::{LightSampler, NO_AREA, NO_LEAF};
+use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
 use crate::blas::{self, Prepared, Root, Texture};
 use crate::env::Environment;
 use crate::error::{Error, Kind as ErrorKind};
-use crate::light::{Illumination, LightTriangle, POSITION_LIMIT};
+use crate::light::{Illumination, LightTriangle};
 use crate::parallel;
 use crate::tlas::{self, MAX_LEAVES, Report};
 
@@ -28,7 +26,7 @@ pub struct LightSamplerBuilder<'a, const N: usize = 8, const M: usize = 4> {
     textures: Vec<Prepared<'a>>,
     /// Triangles that may send light.
     triangles: Vec<LightTriangle>,
-    /// For every triangle that was added, its place in `triangles` or [`NO_LEAF`].
+    /// For every triangle that was added, its place in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
     places: Vec<u32>,
     /// Where each mesh starts in `places`, and the end.
     meshes: Vec<u32>,
@@ -124,33 +122,44 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
 
     fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N, M>, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
-        let emission = Emission::new(&environment);
-        let energies = parallel::collect(self.triangles.len(), |i| emission.energy(&self.triangles[i]));
-        let sending: Vec<u32> = (0..).zip(&energies).filter(|(_, energy)| **energy > 0.0).map(|(i, _)| i).collect();
-        let total: f64 = energies.iter().sum();
-        drop(energies);
+        let emission = Emission::new(&environment, &[]);
+        let sends = parallel::collect(self.triangles.len(), |i| emission.energy(&self.triangles[i]) > 0.0);
+        let sending: Vec<u32> = (0..).zip(sends).filter_map(|(i, sends)| sends.then_some(i)).collect();
         if sending.len() > MAX_LEAVES {
             return Err(Error(ErrorKind::TooMany { what: "light triangles", count: sending.len(), limit: MAX_LEAVES }));
         }
-        let bounds = |light: u32| emission.bounds(&self.triangles[sending[light as usize] as usize], total);
-        let built = tlas::build::<N>(sending.len(), &bounds, report).map_err(|_| Error(ErrorKind::Cancelled))?;
-        let places = parallel::collect(built.lights.len(), |leaf| sending[built.lights[leaf] as usize]);
+        let total = emission.total(&self.triangles);
+        let bounds = |light: u32| emission.bounds(&self.triangles[sending[light as usize] as usize], total).0;
+        let cancelled = |_| Error(ErrorKind::Cancelled);
+        let (tlas, order) = tlas::build::<N>(sending.len(), &bounds, report).map_err(cancelled)?;
+        let places = parallel::collect(order.len(), |leaf| sending[order[leaf] as usize]);
+        let triangles = parallel::collect(places.len(), |leaf| self.triangles[places[leaf] as usize]);
+        let portals = self.triangles.iter().any(LightTriangle::is_portal);
         let mut leaf_of = vec![NO_LEAF; self.triangles.len()];
         for (leaf, &place) in (0..).zip(&places) {
             leaf_of[place as usize] = leaf;
         }
-        let leaf_at = |&place: &u32| if place == NO_LEAF { NO_LEAF } else { leaf_of[place as usize] };
-        Ok(LightSampler {
-            tlas: built.tlas,
-            triangles: parallel::collect(places.len(), |leaf| self.triangles[places[leaf] as usize]),
+        let leaf_at = |&place: &u32| leaf_of.get(place as usize).copied().unwrap_or(place);
+        let mut lights = LightSampler {
+            tlas,
+            triangles,
             leaves: self.places.iter().map(leaf_at).collect(),
             meshes: self.meshes,
+            scales: Vec::new(),
             cells: self.cells,
-            energy: total.min(f64::from(f32::MAX)) as f32,
-            portals: self.triangles.iter().any(LightTriangle::is_portal),
+            energy: 0.0,
+            portals,
             environment,
             illumination: self.illumination,
-        })
+            cost: 1.0,
+            cost_at_build: 1.0,
+        };
+        lights.fit();
+        lights.cost_at_build = lights.cost;
+        match report.map(|report| report(1.0)) {
+            Some(ControlFlow::Break(())) => Err(Error(ErrorKind::Cancelled)),
+            Some(ControlFlow::Continue(())) | None => Ok(lights),
+        }
     }
 
     fn check(&self, number: usize, mesh: &Mesh<'_>) -> Result<(), Error> {
@@ -160,16 +169,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         if count > MAX_LEAVES {
             return fail(ErrorKind::TooMany { what: "triangles", count, limit: MAX_LEAVES });
         }
-        let in_range = |p: &Vec3| p.to_array().iter().all(|x| x.abs() <= POSITION_LIMIT);
-        if let Some(vertex) = mesh.positions.iter().position(|p| !in_range(p)) {
-            let value = mesh.positions[vertex].to_array();
-            return fail(ErrorKind::Position { mesh: number, vertex, value, limit: POSITION_LIMIT });
-        }
-        for (triangle, indices) in mesh.indices.iter().enumerate() {
-            if let Some(&index) = indices.iter().find(|index| **index as usize >= vertices) {
-                return fail(ErrorKind::Index { mesh: number, triangle, index, vertices });
-            }
-        }
+        check_triangles(number, mesh.positions, mesh.indices)?;
         match mesh.weight {
             Weight::Constant(value) if !(0.0..=blas::MAX_AVERAGE).contains(&value) => {
                 fail(ErrorKind::Weight { mesh: number, value, limit: blas::MAX_AVERAGE })
@@ -197,9 +197,14 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
             root,
             flags: two_sided | portal,
         };
-        let sends = root.average > 0.0 && triangle.triangle().normal_and_area().is_some();
-        self.places.push(if sends { self.triangles.len() as u32 } else { NO_LEAF });
-        self.triangles.extend(sends.then_some(triangle));
+        if root.average == 0.0 {
+            self.places.push(NO_LEAF);
+        } else if triangle.triangle().normal_and_area().is_none() {
+            self.places.push(NO_AREA);
+        } else {
+            self.places.push(self.triangles.len() as u32);
+            self.triangles.push(triangle);
+        }
         Ok(())
     }
 

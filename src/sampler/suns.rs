@@ -120,7 +120,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     fn irradiance_by_trees(&self, x: &ShadingPoint) -> f32 {
         if let [light] = self.triangles {
             let Some(lit) = self.lit(0, x) else { return 0.0 };
-            return PI * light.root.average * lit.worth(&blas::Cell::root(lit.vertices)).weight;
+            return PI * light.root.average * self.scale(light) * lit.worth(&blas::Cell::root(lit.vertices)).weight;
         }
         self.energy * self.tlas.irradiance(x, &self.scene(x))
     }
@@ -139,8 +139,8 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         let directions = [axis, axis + s * offset, axis - s * offset, axis + t * offset, axis - t * offset];
         let seen = |direction: Vec3| {
             let transmittance = self.crossing(x, direction).map_or(0.0, |crossing| {
-                let root = self.triangles[crossing.leaf as usize].root;
-                blas::average(self.cells, root, crossing.place)
+                let light = &self.triangles[crossing.leaf as usize];
+                self.scale(light) * blas::average(self.cells, light.root, crossing.place)
             });
             transmittance * x.cosine(direction.normalize_or_zero())
         };
@@ -152,7 +152,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         let mut first: Option<Crossing> = None;
         self.tlas.cross(x.position, direction, |leaf| {
             let light = &self.triangles[leaf as usize];
-            if !light.is_portal() || !light.is_visible(x) {
+            if !light.is_portal() || self.scale(light) == 0.0 || !light.is_visible(x) {
                 return;
             }
             let vertices = light.triangle().exactly_relative_to(x.position);

@@ -9,7 +9,7 @@ use super::collapse::collapse;
 use super::node::Tlas;
 
 use super::progress::{Cancelled, Progress, Report};
-use crate::bounds::{LightBounds, Moments};
+use crate::bounds::LightBounds;
 use crate::parallel::{self, WORTHWHILE};
 
 /// Below this depth lights are split into equal halves, so that no input can make the tree deeper than this plus
@@ -27,38 +27,20 @@ pub(super) struct BinaryNode {
     pub(super) link: u32,
 }
 
-/// A tree over lights.
-#[derive(Debug)]
-pub(crate) struct Built<const N: usize> {
-    pub(crate) tlas: Tlas<N>,
-    /// The lights in the order of the leaves.
-    pub(crate) lights: Vec<u32>,
-    /// See [`Tlas::fit`].
-    pub(crate) cost: f64,
-}
-
-/// Builds a tree of arity `N` over `count` lights, of which `light` tells the bounds.
+/// Arranges `count` lights, of which `light` tells the bounds, in a tree of arity `N`. Returns it with the lights in the
+/// order of its leaves; its nodes know no bounds until [`Tlas::fit`].
 pub(crate) fn build<const N: usize>(
     count: usize,
-    light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync),
+    light: &(impl Fn(u32) -> LightBounds + Sync),
     report: Option<Report<'_>>,
-) -> Result<Built<N>, Cancelled> {
-    let progress = Progress::new(report, count);
-    let (mut tlas, lights) = if count == 0 { (Tlas::default(), Vec::new()) } else { arrange(count, light, &progress)? };
-    let cost = tlas.fit(&|leaf| light(lights[leaf as usize]));
-    progress.finish()?;
-    Ok(Built { tlas, lights, cost })
-}
-
-/// Which light belongs where; the nodes do not know their bounds yet.
-fn arrange<const N: usize>(
-    count: usize,
-    light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync),
-    progress: &Progress<'_>,
 ) -> Result<(Tlas<N>, Vec<u32>), Cancelled> {
-    let mut items = parallel::collect(count, |i| Item::new(&light(i as u32).0, i as u32));
+    if count == 0 {
+        return Ok((Tlas::default(), Vec::new()));
+    }
+    let progress = Progress::new(report, count);
+    let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
     let mut binary = vec![BinaryNode::default(); 2 * count - 1];
-    subdivide(&mut items, &mut binary, 0, progress);
+    subdivide(&mut items, &mut binary, 0, &progress);
     progress.check()?;
     drop(items);
     Ok(collapse(&binary))

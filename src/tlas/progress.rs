@@ -40,15 +40,6 @@ impl<'a> Progress<'a> {
     pub(super) fn check(&self) -> Result<(), Cancelled> {
         if self.placed.get() < CANCELLED { Ok(()) } else { Err(Cancelled) }
     }
-
-    /// Ends with the last report.
-    pub(super) fn finish(self) -> Result<(), Cancelled> {
-        self.check()?;
-        match self.report.map(|report| report(1.0)) {
-            Some(ControlFlow::Break(())) => Err(Cancelled),
-            Some(ControlFlow::Continue(())) | None => Ok(()),
-        }
-    }
 }
 
 /// A count from here on means that the host has cancelled.

@@ -16,8 +16,10 @@ type Light = (LightBounds, Moments);
 
 /// The tree over lights, and the lights in the order of its leaves.
 fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
-    let built = super::build(lights.len(), &|light| lights[light as usize], None).expect("nobody cancels");
-    (built.tlas, built.lights)
+    let (mut tlas, order) =
+        super::build(lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
+    tlas.fit(&|leaf| lights[order[leaf as usize] as usize]);
+    (tlas, order)
 }
 
 /// Leaves are all visible, and portals show the same in every direction.
