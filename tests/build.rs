@@ -5,8 +5,9 @@ mod common;
 
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicUsize, Ordering};
+use core::time::Duration;
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use common::pcg::Pcg32;
 use fanlight::{LightSampler, LightSamplerBuilder, Mesh};

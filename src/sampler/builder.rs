@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use super::emission::Emission;
+use super::energy::Emission;
 use super::lights::{LightSampler, NO_AREA, NO_LEAF};
 use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
 use crate::blas::{self, Prepared, Root, Texture};

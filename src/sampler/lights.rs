@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use glam::Vec3;
 
 use super::builder::LightSamplerBuilder;
-use super::emission::scale_of;
+use super::energy::scale_of;
 use crate::blas;
 use crate::env::{Environment, EnvironmentView, Footprint};
 use crate::light::{Illumination, LightTriangle, Lit};

@@ -3,7 +3,7 @@
 mod builder;
 mod bytes;
 mod direction;
-mod emission;
+mod energy;
 mod lights;
 mod mesh;
 mod pdf;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::emission::{Emission, storable};
+use super::energy::{Emission, storable};
 use super::lights::{LightSampler, NO_AREA};
 use super::mesh::check_triangles;
 use crate::blas;
