@@ -145,7 +145,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     fn irradiance_by_trees(&self, x: &ShadingPoint) -> f32 {
         if let [light] = self.triangles {
             let Some(lit) = self.lit(0, x) else { return 0.0 };
-            return PI * light.root.average * lit.worth(&blas::Cell::root(lit.vertices)).weight;
+            return PI * light.root.average * self.scale(light) * lit.worth(&blas::Cell::root(lit.vertices)).weight;
         }
         self.energy * self.tlas.irradiance(x, &self.scene(x))
     }
@@ -165,7 +165,8 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         let cone = [sin_radius, math::sqrt((1.0 - sin_radius * sin_radius).max(0.0))];
         self.tlas.meet(x.position, axis, cone, |leaf| {
             let light = &self.triangles[leaf as usize];
-            if !light.is_portal() {
+            let scale = self.scale(light);
+            if !light.is_portal() || scale == 0.0 {
                 return;
             }
             if more > 0.0 {
@@ -175,7 +176,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             let Some(lit) = self.lit(leaf, x) else { return };
             self.sunlit(&lit, sun).visit(self.cells, light.root, &mut |part, through| {
                 if techniques.count < end {
-                    techniques.push(leaf, sun, part, through * cosine);
+                    techniques.push(leaf, sun, part, through * scale * cosine);
                 } else {
                     more += 1.0;
                 }
@@ -198,7 +199,11 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         let mut least: Option<(u32, Lattice)> = None;
         self.tlas.cross(x.position, direction, |leaf| {
             let light = &self.triangles[leaf as usize];
-            if !light.is_portal() || least.is_some_and(|(least, _)| least < leaf) || !light.is_visible(x) {
+            if !light.is_portal()
+                || self.scale(light) == 0.0
+                || least.is_some_and(|(least, _)| least < leaf)
+                || !light.is_visible(x)
+            {
                 return;
             }
             if let Some(hit) = geometry::intersect(light.triangle().exactly_relative_to(x.position), direction) {
