@@ -10,6 +10,7 @@ mod oracle;
 mod plot;
 mod report;
 mod scenes;
+mod terms;
 mod timing;
 mod variance;
 
@@ -28,6 +29,9 @@ use scenes::Scene;
 use variance::{Estimator, Measured};
 
 fn main() -> ExitCode {
+    if std::env::args().any(|word| word == "--terms") {
+        return terms::run();
+    }
     let args = match Args::parse() {
         Ok(args) => args,
         Err(message) => {
