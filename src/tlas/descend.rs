@@ -3,7 +3,7 @@
 use super::importance::{Scene, Sight};
 use super::node::{Child, Node, TlasView};
 use crate::record::ShadingPoint;
-use crate::simd::{Level, Work};
+use crate::simd::{Level, Work, prefetch};
 use crate::warp::{Variate, pick_wide, pmf_wide};
 
 /// The way down to a leaf.
@@ -50,9 +50,15 @@ impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
 
     #[inline(always)]
     fn run(self) -> f64 {
+        // The way is short to find, but its nodes are far apart in memory.
+        self.tlas.path(self.leaf).for_each(|(node, _)| prefetch(&self.tlas.nodes[node]));
         let sight = Sight::new(self.x);
-        let share = |(node, lane): (usize, usize)| pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane);
-        self.tlas.path(self.leaf).map(share).product()
+        let mut pmf = 1.0;
+        // Not a fold, whose closure would be compiled for the baseline.
+        for (node, lane) in self.tlas.path(self.leaf) {
+            pmf *= pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane);
+        }
+        pmf
     }
 }
 
