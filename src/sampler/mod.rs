@@ -7,6 +7,7 @@ mod direction;
 mod emission;
 mod forward;
 mod lights;
+mod many;
 mod mesh;
 mod pdf;
 mod sample;

@@ -24,6 +24,18 @@ pub(crate) trait Scene {
     fn is_visible(&self, leaf: u32) -> bool;
 }
 
+impl<S: Scene> Scene for &S {
+    #[inline(always)]
+    fn radiance(&self, center: Vec3, radius: f32) -> f32 {
+        (**self).radiance(center, radius)
+    }
+
+    #[inline(always)]
+    fn is_visible(&self, leaf: u32) -> bool {
+        (**self).is_visible(leaf)
+    }
+}
+
 /// Least expected cosine of a cluster that is not culled.
 const LEAST_COSINE: f32 = 1e-3;
 /// Relative error granted to the dot products that decide on culling.

@@ -1,0 +1,56 @@
+//! Points on the lights for many shading points at once.
+
+use smallvec::SmallVec;
+
+use super::lights::{LightSampler, LightSamplerView, Scene};
+use super::sample::variates;
+use super::suns::Technique;
+use crate::record::{LightSample, ShadingPoint};
+use crate::simd::prefetch;
+use crate::tlas::Walk;
+
+/// Walks down the tree that take turns: enough to hide what one waits for, few enough to stay in the cache.
+const TURNS: usize = 8;
+
+impl<const N: usize, const M: usize> LightSampler<N, M> {
+    /// See [`LightSamplerView::sample_many`].
+    pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
+        self.as_view().sample_many(queries, samples);
+    }
+}
+
+impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
+    /// Draws one sample for each shading point and its random numbers, the same as
+    /// [`PointSampler::sample`](super::PointSampler::sample) draws, but faster: a walk down a large tree mostly waits,
+    /// and here several take turns.
+    ///
+    /// Where one slice is longer, the rest of it is left alone.
+    pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
+        for (queries, samples) in queries.chunks(TURNS).zip(samples.chunks_mut(TURNS)) {
+            self.sample_few(queries, samples);
+        }
+    }
+
+    fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
+        let mut walks = SmallVec::<[Walk<Scene<'_>>; TURNS]>::new();
+        let mut waiting = SmallVec::<[_; TURNS]>::new();
+        for ((x, u), sample) in queries.iter().zip(samples) {
+            let at = self.at(x);
+            let [mut choice, point @ ..] = variates(*u);
+            match at.techniques.choose(&mut choice) {
+                Technique::Sun(sun) => *sample = at.sample_sun(sun, point, None),
+                Technique::Trees => {
+                    walks.push(Walk::new(x, self.scene(x), choice));
+                    waiting.push((at, point, sample));
+                }
+            }
+        }
+        self.tlas.sample_many(&mut walks);
+        for (leaf, _) in walks.iter().filter_map(Walk::leaf) {
+            prefetch(&self.triangles[leaf as usize]);
+        }
+        for (walk, (at, point, sample)) in walks.iter().zip(waiting) {
+            *sample = walk.leaf().and_then(|(leaf, pmf)| at.sample_on(leaf, pmf, point));
+        }
+    }
+}
