@@ -143,7 +143,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 
     /// What the tree over triangles asks for at a shading point.
     pub(super) fn scene<'s>(&'s self, x: &'s ShadingPoint) -> Scene<'s> {
-        Scene { x, triangles: self.triangles, environment: self.environment }
+        Scene { x, triangles: self.triangles, environment: &self.environment }
     }
 }
 
@@ -151,7 +151,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 pub(super) struct Scene<'a> {
     x: &'a ShadingPoint,
     triangles: &'a [LightTriangle],
-    environment: EnvironmentView<'a>,
+    environment: &'a EnvironmentView<'a>,
 }
 
 impl tlas::Scene for Scene<'_> {

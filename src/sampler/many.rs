@@ -2,9 +2,10 @@
 
 use smallvec::SmallVec;
 
+use super::at::PointSampler;
 use super::lights::{LightSampler, LightSamplerView, Scene};
 use super::sample::variates;
-use super::suns::Technique;
+use super::suns::{Technique, Techniques};
 use crate::record::{LightSample, ShadingPoint};
 use crate::simd::prefetch;
 use crate::tlas::Walk;
@@ -21,7 +22,7 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
 
 impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     /// Draws one sample for each shading point and its random numbers, the same as
-    /// [`PointSampler::sample`](super::PointSampler::sample) draws, but faster: a walk down a large tree mostly waits,
+    /// [`PointSampler::sample`] draws, but faster: a walk down a large tree mostly waits,
     /// and here several take turns.
     ///
     /// Where one slice is longer, the rest of it is left alone.
@@ -33,15 +34,18 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
 
     fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
         let mut walks = SmallVec::<[Walk<Scene<'_>>; TURNS]>::new();
-        let mut waiting = SmallVec::<[_; TURNS]>::new();
-        for ((x, u), sample) in queries.iter().zip(samples) {
-            let at = self.at(x);
+        // The places and techniques of those that go down the tree.
+        let mut waiting = SmallVec::<[(usize, Techniques); TURNS]>::new();
+        for (i, ((x, u), sample)) in queries.iter().zip(&mut *samples).enumerate() {
+            let techniques = self.techniques(x);
             let [mut choice, point @ ..] = variates(*u);
-            match at.techniques.choose(&mut choice) {
-                Technique::Sun(sun) => *sample = at.sample_sun(sun, point, None),
+            match techniques.choose(&mut choice) {
+                Technique::Sun(sun) => {
+                    *sample = PointSampler { lights: *self, x: *x, techniques }.sample_sun(sun, point, None);
+                }
                 Technique::Trees => {
                     walks.push(Walk::new(x, self.scene(x), choice));
-                    waiting.push((at, point, sample));
+                    waiting.push((i, techniques));
                 }
             }
         }
@@ -49,8 +53,11 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         for (leaf, _) in walks.iter().filter_map(Walk::leaf) {
             prefetch(&self.triangles[leaf as usize]);
         }
-        for (walk, (at, point, sample)) in walks.iter().zip(waiting) {
-            *sample = walk.leaf().and_then(|(leaf, pmf)| at.sample_on(leaf, pmf, point));
+        for (walk, &(i, techniques)) in walks.iter().zip(&waiting) {
+            let (x, u) = queries[i];
+            let [_, point @ ..] = variates(u);
+            let at = PointSampler { lights: *self, x, techniques };
+            samples[i] = walk.leaf().and_then(|(leaf, pmf)| at.sample_on(leaf, pmf, point));
         }
     }
 }
