@@ -163,7 +163,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 
     /// What the tree over triangles asks for at a shading point.
     pub(super) fn scene<'s>(&'s self, x: &'s ShadingPoint) -> Scene<'s> {
-        Scene { x, triangles: self.triangles, environment: self.environment, sends: self.energy > 0.0 }
+        Scene { x, triangles: self.triangles, environment: &self.environment, sends: self.energy > 0.0 }
     }
 }
 
@@ -171,7 +171,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 pub(super) struct Scene<'a> {
     x: &'a ShadingPoint,
     triangles: &'a [LightTriangle],
-    environment: EnvironmentView<'a>,
+    environment: &'a EnvironmentView<'a>,
     /// Whether any triangle sends anything.
     sends: bool,
 }

@@ -8,6 +8,7 @@ mod emission;
 mod energy;
 mod forward;
 mod lights;
+mod many;
 mod mesh;
 mod pdf;
 mod refit;
