@@ -11,6 +11,7 @@ mod pdf;
 mod sample;
 mod split;
 mod suns;
+mod techniques;
 
 pub use at::PointSampler;
 pub use builder::LightSamplerBuilder;
