@@ -12,12 +12,12 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DVec3, Vec3};
 
-const SIZE: usize = 256;
+const SIZE: usize = 512;
 
 /// Suns in the middle of a face of the octahedron, on its edges (the equator among them) and corners, and one of
 /// more texels than are kept apart.
 fn zoo(pcg: &mut Pcg32) -> Vec<Environment> {
-    let places = [(75, 100, 3), (128, 128, 3), (40, 88, 3), (128, 40, 3), (2, 128, 3), (2, 2, 2), (100, 91, 10)];
+    let places = [(150, 200, 3), (256, 256, 3), (80, 176, 3), (256, 80, 3), (2, 256, 3), (2, 2, 2), (200, 181, 17)];
     let sun = |(x, y, side): (usize, usize, usize)| {
         let mut image = vec![0.1; SIZE * SIZE];
         for (i, j) in (0..side * side).map(|k| (k % side, k / side)) {
