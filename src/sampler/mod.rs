@@ -15,6 +15,7 @@ mod refit;
 mod sample;
 mod split;
 mod suns;
+mod techniques;
 
 pub use at::PointSampler;
 pub use builder::LightSamplerBuilder;

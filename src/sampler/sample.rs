@@ -1,7 +1,7 @@
 //! A point on the lights for a shading point.
 
 use super::at::PointSampler;
-use super::suns::Technique;
+use super::techniques::Technique;
 use crate::blas::{self, Draw, Lattice};
 use crate::light::Lit;
 use crate::record::{Hit, LightSample};

@@ -17,7 +17,7 @@ use crate::warp::{Variate, seed};
 type Light = (LightBounds, Moments);
 
 /// The tree over lights, and the lights in the order of its leaves.
-fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
+pub(super) fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
     let (mut tlas, order) =
         super::build(lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
     tlas.fit(&|leaf| lights[order[leaf as usize] as usize]);

@@ -8,8 +8,9 @@ use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::record::{Receiver, ShadingPoint};
 use crate::testing::Pcg32;
+use crate::tlas::Scene;
 use crate::tlas::node::{Child, Node, TlasView};
-use crate::tlas::{Scene, build};
+use crate::tlas::tests::build;
 
 /// Everything is visible.
 struct Open;
