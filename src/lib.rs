@@ -75,7 +75,8 @@
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
 //! - punctual lights: points, spots and directions without an extent.
-//! - updates of a built sampler, except that the environment can be turned.
+//! - updates of a built sampler, except that the environment can be turned, and that lights can move and change their
+//!   brightness ([`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
 //!
 //! # Units and measures
@@ -120,6 +121,7 @@ mod error;
 mod geometry;
 mod light;
 mod math;
+mod parallel;
 mod record;
 mod sampler;
 mod simd;
@@ -139,7 +141,7 @@ pub use error::Error;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
 pub use sampler::{
-    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, PointSampler, Sides,
-    TextureId, Weight,
+    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, PointSampler,
+    Sides, TextureId, Weight,
 };
 pub use tlas::Splitting;

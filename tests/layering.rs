@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules by level. Those of one level never import each other.
 const LEVELS: [&[&str]; 5] = [
-    &["error", "math", "simd", "geometry"],
+    &["error", "math", "simd", "geometry", "parallel"],
     &["record", "bounds", "warp"],
     &["env", "blas", "tlas"],
     &["light"],

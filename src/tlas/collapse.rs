@@ -6,7 +6,7 @@ use super::build::BinaryNode;
 use super::forest::{Cut, forests};
 use super::node::{Node, Slot, Spread, Tlas};
 
-/// Collapses a binary tree. Returns the wide tree with the lights in the order of its leaves, which follows the
+/// Collapses a binary tree. Returns the wide tree, whose nodes have no bounds yet, with the lights in the order of its leaves, which follows the
 /// tree, so that the lights of one node are neighbours in memory. So are the nodes below one node; and what is below
 /// the first of them comes before what is below the second.
 pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u32>) {
@@ -17,10 +17,8 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
         lights.push(leaf.link);
         return (tlas, lights);
     }
-    let total = binary[0].bounds.energy();
-    let energies = leaf_moments(binary, total);
     let forests = forests::<N>(binary);
-    tlas.push(Slot::ROOT, energies[0]);
+    tlas.push(Slot::ROOT);
     // Wide nodes that wait for their children, each with its binary node.
     let mut pending = Vec::from([(0, 0)]);
     while let Some((index, root)) = pending.pop() {
@@ -29,16 +27,11 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
         let nodes = members().filter(|&below| binary[below].count > 1);
         let leaves = members().filter(|&below| binary[below].count == 1);
         let first = tlas.nodes.len();
-        for (lane, below) in nodes.clone().enumerate() {
-            tlas.push(Slot::new::<N>(index, lane), energies[below]);
+        for lane in 0..nodes.clone().count() {
+            tlas.push(Slot::new::<N>(index, lane));
         }
         let node_count = tlas.nodes.len() - first;
         tlas.nodes[index] = Node::new(first, node_count, lights.len(), cut.members().len());
-        let mut known = [(binary[root].bounds, binary[root].moments); N];
-        for (lane, below) in nodes.clone().chain(leaves.clone()).enumerate() {
-            known[lane] = (binary[below].bounds, binary[below].moments);
-        }
-        tlas.nodes[index].set(&known[..cut.members().len()]);
         for (lane, below) in (node_count..).zip(leaves) {
             tlas.leaves.push(Slot::new::<N>(index, lane));
             lights.push(binary[below].link);
@@ -52,28 +45,9 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
 }
 
 impl<const N: usize> Tlas<N> {
-    fn push(&mut self, parent: Slot, spread: Spread) {
+    fn push(&mut self, parent: Slot) {
         self.nodes.push(Node::new(0, 0, 0, 0));
         self.parents.push(parent);
-        self.spreads.push(spread);
+        self.spreads.push(Spread::default());
     }
-}
-
-/// Count, mean and variance of the leaves' energies, relative to `total`, below every binary node.
-fn leaf_moments(binary: &[BinaryNode], total: f32) -> Vec<Spread> {
-    // Sum and sum of squares, children before parents: a child always lies behind its parent.
-    let mut sums = Vec::from_iter(binary.iter().map(|node| {
-        let energy = f64::from(node.bounds.energy()) / f64::from(total);
-        (energy, energy * energy)
-    }));
-    for i in (0..binary.len()).rev().filter(|&i| binary[i].count > 1) {
-        let (left, right) = (sums[i + 1], sums[i + binary[i].link as usize]);
-        sums[i] = (left.0 + right.0, left.1 + right.1);
-    }
-    let spread = |(node, &(sum, squares)): (&BinaryNode, &(f64, f64))| {
-        let count = f64::from(node.count);
-        let mean = sum / count;
-        Spread { count: count as f32, mean: mean as f32, variance: (squares / count - mean * mean).max(0.0) as f32 }
-    };
-    binary.iter().zip(&sums).map(spread).collect()
 }

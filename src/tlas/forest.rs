@@ -24,7 +24,7 @@ pub(super) struct Forest<const N: usize> {
 
 /// The cheapest way to divide each node of a binary tree.
 pub(super) fn forests<const N: usize>(binary: &[BinaryNode]) -> Vec<Forest<N>> {
-    let cost = |node: &BinaryNode| math::sqrt(node.bounds.cost(0.0));
+    let cost = |node: &BinaryNode| math::sqrt(node.cost);
     let small = || binary.iter().filter(|node| node.count > 1 && node.count as usize <= N);
     let (sum, count) = small().fold((0.0, 0), |(sum, count), node| (sum + f64::from(cost(node)), count + 1));
     let node_cost = NODE_COST * (sum / f64::from(count.max(1))) as f32;

@@ -158,7 +158,7 @@ impl<const N: usize> Node<N> {
 
 /// What splitting needs to know of all leaves below a node: energies relative to the whole tree's.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub(crate) struct Spread {
     /// Number of leaves, as a float, for it is only multiplied.
     pub(super) count: f32,
@@ -166,6 +166,14 @@ pub(crate) struct Spread {
     pub(super) mean: f32,
     /// Variance of the energy of the leaves.
     pub(super) variance: f32,
+}
+
+impl Spread {
+    /// The same of energies that are multiplied.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.mean = (f64::from(self.mean) * factor) as f32;
+        self.variance = (f64::from(self.variance) * factor * factor) as f32;
+    }
 }
 
 /// Where the walk from a node or leaf to the root goes on: the lane that refers to it.

@@ -6,13 +6,23 @@ use glam::Vec3;
 
 use super::descend::{Draw, Follow};
 use super::node::{Child, TlasView};
-use super::{Scene, Splitting, Tlas, build};
+use super::{Scene, Splitting, Tlas};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::record::ShadingPoint;
 use crate::simd::Level;
 use crate::testing::Pcg32;
 use crate::warp::{Variate, seed};
+
+type Light = (LightBounds, Moments);
+
+/// The tree over lights, and the lights in the order of its leaves.
+fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
+    let (mut tlas, order) =
+        super::build(lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
+    tlas.fit(&|leaf| lights[order[leaf as usize] as usize]);
+    (tlas, order)
+}
 
 /// Leaves are all visible, and portals show the same in every direction.
 struct Open;
@@ -40,7 +50,7 @@ impl Scene for Odd {
     }
 }
 
-fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<(LightBounds, Moments)> {
+fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<Light> {
     let size = 0.3 / (n as f32).cbrt();
     let light = |_| {
         let center = Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
