@@ -138,6 +138,8 @@ struct Readme;
 pub use blas::Texture;
 pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSample, EnvironmentView, Sun, SunTexel};
 pub use error::Error;
+/// The vectors of the interface.
+pub use glam;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
 pub use sampler::{

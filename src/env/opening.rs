@@ -88,7 +88,7 @@ impl EnvironmentView<'_> {
         }
         u[1].stretch(target - low, width, 1.0);
         match chosen {
-            Some((texel, Cut::Part(polygon))) => self.direction_in(sun, texel, polygon.sample(u)),
+            Some((texel, Cut::Part(polygon, _))) => self.direction_in(sun, texel, polygon.sample(u)),
             Some((texel, _)) => self.direction_in(sun, texel, u.map(|u| u.value_f32() - 0.5)),
             None => self.sample_sun(sun, u),
         }

@@ -26,9 +26,10 @@ impl Polygon {
     pub(super) fn clip(&self, [c, s, t]: [f32; 3]) -> Self {
         let mut out = Self { vertices: [[0.0; 2]; CAPACITY], len: 0 };
         let side = |[x, y]: [f32; 2]| c + s * x + t * y;
-        let Some(&last) = self.vertices[..self.len].last() else { return out };
+        let vertices = &self.vertices[..self.len];
+        let Some(&last) = vertices.last() else { return out };
         let (mut a, mut da) = (last, side(last));
-        for &b in &self.vertices[..self.len] {
+        for &b in vertices {
             let db = side(b);
             if (da < 0.0) != (db < 0.0) {
                 let k = da / (da - db);

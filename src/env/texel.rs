@@ -30,6 +30,8 @@ pub struct SunTexel {
     pub excess: f32,
     /// Bound on the distance between a direction in the texel and the parallelogram's.
     pub margin: f32,
+    /// Half of the parallelogram's longer diagonal, and the margin.
+    pub radius: f32,
     /// Direction of the centre, in the environment's frame.
     pub center: [f32; 3],
     /// The two sides of the parallelogram.
@@ -41,17 +43,17 @@ pub struct SunTexel {
 pub(super) enum Cut {
     Nothing,
     All,
-    /// In units of the texel, around its centre.
-    Part(Polygon),
+    /// In units of the texel, around its centre, and its area.
+    Part(Polygon, f32),
 }
 
 impl Cut {
     /// Share of the texel's area.
-    pub(super) fn share(&self) -> f32 {
+    pub(super) fn share(self) -> f32 {
         match self {
             Self::Nothing => 0.0,
             Self::All => 1.0,
-            Self::Part(polygon) => polygon.area(),
+            Self::Part(_, area) => area,
         }
     }
 }
@@ -72,28 +74,45 @@ impl SunTexel {
         }
         let margin = BETWEEN * departure + ROUNDING;
         let [s, t] = sides;
-        Self { texel, sum: 0.0, excess, margin, center: center.to_array(), sides: [s.to_array(), t.to_array()] }
+        let radius = 0.5 * (s + t).length().max((s - t).length()) + margin;
+        let (center, sides) = (center.to_array(), sides.map(|side| side.to_array()));
+        Self { texel, sum: 0.0, excess, margin, radius, center, sides }
     }
 
     /// What is seen of the texel.
     #[inline]
     pub(super) fn cut(&self, opening: &Opening) -> Cut {
         let center = Vec3::from_array(self.center);
-        let [s, t] = self.sides.map(Vec3::from_array);
-        let lines = opening.planes.map(|plane| [plane.dot(center) + self.margin, plane.dot(s), plane.dot(t)]);
-        let reach = lines.map(|[_, a, b]| 0.5 * (a.abs() + b.abs()));
-        if (0..3).any(|i| lines[i][0] < -reach[i]) {
+        let depths = opening.planes.map(|plane| plane.dot(center));
+        let [a, b, c] = depths;
+        let least = a.min(b).min(c);
+        // Most texels are decided by their distances from the planes.
+        if least < -self.radius {
             return Cut::Nothing;
         }
-        if (0..3).all(|i| lines[i][0] >= reach[i]) {
+        if least >= self.radius {
             return Cut::All;
         }
-        let mut polygon = Polygon::square();
-        for i in 0..3 {
-            if lines[i][0] < reach[i] {
-                polygon = polygon.clip(lines[i]);
+        self.cut_exactly(opening, depths)
+    }
+
+    fn cut_exactly(&self, opening: &Opening, depths: [f32; 3]) -> Cut {
+        let [s, t] = self.sides.map(Vec3::from_array);
+        let mut part = None;
+        for (plane, depth) in opening.planes.into_iter().zip(depths) {
+            let line = [depth + self.margin, plane.dot(s), plane.dot(t)];
+            let reach = 0.5 * (line[1].abs() + line[2].abs());
+            if line[0] < -reach {
+                return Cut::Nothing;
+            }
+            if line[0] < reach {
+                part = Some(part.unwrap_or_else(Polygon::square).clip(line));
             }
         }
-        if polygon.area() > 0.0 { Cut::Part(polygon) } else { Cut::Nothing }
+        match part.map(|polygon: Polygon| (polygon, polygon.area())) {
+            None => Cut::All,
+            Some((polygon, area)) if area > 0.0 => Cut::Part(polygon, area),
+            Some(_) => Cut::Nothing,
+        }
     }
 }

@@ -15,11 +15,13 @@ pub(crate) struct Part {
     pub(crate) domain: Domain,
     /// The texture's node below it.
     node: u32,
+    /// What the sun sends through it, with the texture taken for one.
+    through: f32,
 }
 
 impl Part {
     /// The whole of a triangle of one opacity.
-    pub(crate) const WHOLE: Self = Self { domain: Domain::root(), node: LEAF };
+    pub(crate) const WHOLE: Self = Self { domain: Domain::root(), node: LEAF, through: 0.0 };
 }
 
 /// A sun behind a light triangle: the target that cells are chosen by where it is drawn by itself.
@@ -32,13 +34,13 @@ pub(crate) struct Sunlit<'a> {
 
 impl Sunlit<'_> {
     /// The directions in which a cell is seen.
-    fn opening(&self, cell: &Cell) -> Opening {
-        self.environment.opening(cell.domain.corners().map(|corner| self.lit.point(corner)))
+    fn opening(&self, domain: Domain) -> Opening {
+        self.environment.opening(domain.corners().map(|corner| self.lit.point(corner)))
     }
 
     /// What the sun sends through a cell, with the cell's texture taken for one.
     fn through(&self, cell: &Cell) -> f32 {
-        self.environment.sun_through(self.sun, &self.opening(cell))
+        self.environment.sun_through(self.sun, &self.opening(cell.domain))
     }
 
     /// Finds the parts of the triangle that the sun is seen through, and what it sends through each. A part is all of
@@ -54,14 +56,14 @@ impl Sunlit<'_> {
         below: Root,
         found: &mut impl FnMut(Part, f32),
     ) {
-        let opening = self.opening(cell);
+        let opening = self.opening(cell.domain);
         if below.average == 0.0 || self.environment.cover_of_sun(self.sun, &opening) == Cover::Nothing {
             return;
         }
         if below.node == LEAF || self.is_small(cell) {
-            let through = below.average * self.environment.sun_through(self.sun, &opening);
-            if through > 0.0 {
-                found(Part { domain: cell.domain, node: below.node }, through);
+            let through = self.environment.sun_through(self.sun, &opening);
+            if through * below.average > 0.0 {
+                found(Part { domain: cell.domain, node: below.node, through }, through * below.average);
             }
             return;
         }
@@ -74,17 +76,28 @@ impl Sunlit<'_> {
 
     /// Draws a point in a part.
     pub(crate) fn sample<const M: usize>(&self, nodes: &[Node<M>], part: Part, u: [Variate; 2]) -> Option<Lattice> {
+        if part.node == LEAF {
+            return self.sample_in(part.domain, Some(part.through), u);
+        }
         let mut draw = Draw::new(u);
         let (cell, _) = blas::descend_below(nodes, part.node, self.cell(part.domain), self, &mut draw)?;
-        let opening = self.opening(&cell);
-        let through = self.environment.sun_through(self.sun, &opening);
-        let direction = self.environment.sample_sun_through(self.sun, &opening, through, draw.rest());
+        self.sample_in(cell.domain, None, draw.rest())
+    }
+
+    /// Draws a point in a cell of one opacity, of which it may be known what the sun sends through it.
+    fn sample_in(&self, domain: Domain, through: Option<f32>, u: [Variate; 2]) -> Option<Lattice> {
+        let opening = self.opening(domain);
+        let through = through.unwrap_or_else(|| self.environment.sun_through(self.sun, &opening));
+        let direction = self.environment.sample_sun_through(self.sun, &opening, through, u);
         let place = Lattice::from_barycentrics(self.lit.intersect(direction)?);
-        cell.domain.holds(place).then_some(place)
+        domain.holds(place).then_some(place)
     }
 
     /// Density per solid angle with which [`Self::sample`] draws a point of the part, over the sun's excess there.
     pub(crate) fn pdf_per_excess<const M: usize>(&self, nodes: &[Node<M>], part: Part, place: Lattice) -> f64 {
+        if part.node == LEAF {
+            return 1.0 / f64::from(part.through);
+        }
         let mut follow = Follow::below(part.domain, place);
         let found = blas::descend_below(nodes, part.node, self.cell(part.domain), self, &mut follow);
         found.map_or(0.0, |(cell, pmf)| match self.through(&cell) {
