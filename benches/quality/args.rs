@@ -28,7 +28,7 @@ pub(crate) struct Effort {
 impl Effort {
     const FULL: Self = Self {
         points: 1000,
-        samples: 2048,
+        samples: 4096,
         calls: 1 << 16,
         repeats: 9,
         choices: 20_000_000,

@@ -68,16 +68,19 @@ impl Estimator<'_> {
         self.openings.map(Reference::Openings).or_else(|| is_plain.then(lights))
     }
 
-    /// Plain Monte Carlo with the method's own samples.
+    /// Plain Monte Carlo with the method's own samples. The irradiance of a method with an environment of its own is
+    /// that of its environment.
     fn plain(&self, x: &ShadingPoint, truth: &Truth, samples: usize, pcg: &mut Pcg32) -> Measured {
-        let (mut squares, mut zeros) = (0.0, 0.0);
+        let (mut sum, mut squares, mut zeros) = (0.0, 0.0, 0.0);
         for _ in 0..samples {
             let drawn = self.method.sample(x, pcg.uniform3());
             let estimate = drawn.map_or(0.0, |drawn| contribution(self.scene, x, &drawn) / drawn.pdf);
             zeros += f64::from(u8::from(estimate == 0.0));
+            sum += estimate - truth.total;
             squares += (estimate - truth.total).powi(2);
         }
-        let [variance, zeros] = [squares, zeros].map(|sum| sum / samples as f64);
+        let [bias, square, zeros] = [sum, squares, zeros].map(|sum| sum / samples as f64);
+        let variance = if self.method.has_own_environment() { square - bias * bias } else { square };
         Measured { class: truth.class, e2: truth.total * truth.total, variance, zeros, lost: 0.0 }
     }
 
