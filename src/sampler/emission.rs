@@ -60,7 +60,7 @@ struct Everywhere;
 impl Shape for Everywhere {
     #[inline]
     fn worth(&self, _cell: &Cell) -> Worth {
-        Worth { weight: 1.0, uniform: true }
+        Worth { weight: 1.0, uniform: true, even: true }
     }
 }
 

@@ -94,7 +94,7 @@ pub(super) fn pdf_area(lit: &Lit<'_>, cell: &blas::Cell, cell_pmf: f64) -> f64 {
 
 /// Density per solid angle, on a triangle that is chosen, of a given point.
 pub(super) fn follow<const M: usize>(
-    cells: &[blas::Node<M>],
+    cells: &[blas::Block<M>],
     root: blas::Root,
     lit: &Lit<'_>,
     place: Lattice,
