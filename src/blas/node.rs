@@ -8,7 +8,6 @@ use alloc::vec::Vec;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::blas::barycentric;
 use crate::blas::code::{LARGEST, decode, encode};
 
 /// Stands for "no node below": the weight is taken for constant over the cell.

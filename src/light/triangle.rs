@@ -15,6 +15,12 @@ pub(crate) const POSITION_LIMIT: f32 = 1e9;
 /// Ratio of squared radius to squared distance up to which the geometry is taken for the same all over a cell.
 const FAR: f32 = 1.0 / 16.0;
 
+/// Ratio of the least to the largest cosine of the receiver in a cell from which it is taken for the same.
+const EVEN_COSINE: f32 = 0.5;
+
+/// Share of the largest height over the receiver's plane below which a cell is not divided for its cosine.
+const LOW_COSINE: f32 = 1.0 / 16.0;
+
 const NEAR: f32 = 1.0 / 256.0;
 /// What is kept of every triangle that can send light.
 #[repr(C)]
@@ -94,6 +100,8 @@ pub(crate) struct Lit<'a> {
     normal_of_receiver: Vec3,
     /// See [`horizon`].
     horizon: f32,
+    /// Of the vertices over the receiver's plane.
+    highest: f32,
     illumination: Illumination,
     /// What the triangle is a portal to, if that depends on the direction.
     environment: Option<EnvironmentView<'a>>,
@@ -126,6 +134,7 @@ impl<'a> Lit<'a> {
             radius2: vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared())),
             normal_of_receiver,
             horizon: horizon(normal_of_receiver, &vertices),
+            highest: vertices.iter().fold(0.0, |h: f32, v| h.max(normal_of_receiver.dot(*v).abs())),
             exact_vertices: triangle.exactly_relative_to(x.position),
             normal,
             area,
@@ -167,6 +176,15 @@ impl<'a> Lit<'a> {
 }
 
 impl Lit<'_> {
+    /// Whether the receiver's cosine is about the same all over a cell, given the heights of its corners over the
+    /// receiver's plane, or too small to matter.
+    #[inline(always)]
+    fn is_evenly_lifted(&self, [a, b, c]: [f32; 3]) -> bool {
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let top = high.max(-low);
+        low.abs().min(high.abs()) >= EVEN_COSINE * top && low * high >= 0.0 || top <= LOW_COSINE * self.highest
+    }
+
     /// Parts of one cell. `corners` and `centers` are by coordinate; the share is that of one part.
     #[inline(always)]
     fn judge<const M: usize>(
@@ -194,7 +212,9 @@ impl Lit<'_> {
         };
         let mut weights = self.illumination.estimate(&self.receiver, &views, vertices);
         let radius2 = self.radius2 * parts.share;
-        let far: [bool; M] = core::array::from_fn(|i| radius2 <= FAR * distance2[i]);
+        let far: [bool; M] = core::array::from_fn(|i| {
+            radius2 <= FAR * distance2[i] && self.is_evenly_lifted(parts.heights.map(|height| height[i]))
+        });
         let Some(environment) = self.environment.filter(|_| !even) else {
             return Worths { weights, uniform: far, even: [true; M] };
         };
