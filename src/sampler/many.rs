@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use super::at::PointSampler;
 use super::lights::{LightSampler, LightSamplerView, Scene};
 use super::sample::variates;
-use super::suns::{Technique, Techniques};
+use super::techniques::{Technique, Techniques};
 use crate::record::{LightSample, ShadingPoint};
 use crate::simd::prefetch;
 use crate::tlas::Walk;
