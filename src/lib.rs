@@ -121,6 +121,7 @@ mod math;
 mod parallel;
 mod record;
 mod sampler;
+mod simd;
 #[cfg(test)]
 mod testing;
 mod tlas;
@@ -136,5 +137,8 @@ pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSampl
 pub use error::Error;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
-pub use sampler::{LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, Sides, TextureId, Weight};
+pub use sampler::{
+    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, PointSampler,
+    Sides, TextureId, Weight,
+};
 pub use tlas::Splitting;

@@ -4,8 +4,8 @@ use super::pyramid::{children, level_start};
 use super::rotation::to_world;
 use super::suns::Sun;
 use super::view::EnvironmentView;
-use crate::warp::discrete::pick_pair;
 use crate::warp::equal_area::{SPHERE, square_to_sphere};
+use crate::warp::pick_pair;
 use crate::warp::variate::{Variate, seed};
 use glam::{Vec2, Vec3};
 
@@ -39,20 +39,21 @@ impl EnvironmentView<'_> {
             return None;
         }
         let salt = seed(&u);
-        let mut column = Variate::new(u[0], salt);
-        let mut row = Variate::new(u[1], !salt);
-        let (mut x, mut y) = (0, 0);
-        for depth in 0..self.header.depth {
-            let [a, b, c, d] = children(self.means, depth, x, y);
-            let j = pick_pair([a + b, c + d], &mut row);
-            let columns = [[a, b], [c, d]][j];
-            let i = pick_pair(columns, &mut column);
-            (x, y) = (2 * x + i as u32, 2 * y + j as u32);
+        let mut place = [Variate::new(u[0], salt), Variate::new(u[1], !salt)];
+        Some(self.sample_below(0, [0, 0], &mut place))
+    }
+
+    /// Draws a direction below a texel of a level in proportion to its radiance. Its density is that of
+    /// [`sample`](Self::sample), not given the texel.
+    #[inline]
+    pub(super) fn sample_below(&self, depth: u32, [mut x, mut y]: [u32; 2], u: &mut [Variate; 2]) -> EnvironmentSample {
+        for depth in depth..self.header.depth {
+            [x, y] = step(children(self.means, depth, x, y), [x, y], u);
         }
-        let point = Vec2::new(self.inside(x, column.value_f32()), self.inside(y, row.value_f32()));
+        let point = Vec2::new(self.inside(x, u[0].value_f32()), self.inside(y, u[1].value_f32()));
         let direction = to_world(&self.header.rotation, square_to_sphere(point));
         let radiance = self.mean_at(self.header.depth, x, y);
-        Some(EnvironmentSample { direction, radiance, pdf: self.pdf_of(radiance) })
+        EnvironmentSample { direction, radiance, pdf: self.pdf_of(radiance) }
     }
 
     /// Draws a world direction in a sun, with a density in proportion to its excess over the cap.
@@ -117,4 +118,13 @@ impl EnvironmentView<'_> {
         let low = texel as f32 * side;
         ((texel as f32 + place) * side).max(low + MARGIN).min(low + side - MARGIN)
     }
+}
+
+/// Chooses one of the four texels below a texel in proportion to their weights: the second variate the row, the
+/// first one the column.
+#[inline]
+pub(super) fn step([a, b, c, d]: [f32; 4], [x, y]: [u32; 2], u: &mut [Variate; 2]) -> [u32; 2] {
+    let j = pick_pair([a + b, c + d], &mut u[1]);
+    let i = pick_pair([[a, b], [c, d]][j], &mut u[0]);
+    [2 * x + i as u32, 2 * y + j as u32]
 }

@@ -6,6 +6,7 @@
 
 mod build;
 mod descend;
+mod directions;
 mod footprint;
 mod lat_long;
 mod parts;
@@ -21,6 +22,7 @@ mod view;
 
 pub use build::Environment;
 pub use descend::EnvironmentSample;
+pub(crate) use directions::Directions;
 pub(crate) use footprint::Footprint;
 pub use parts::EnvironmentParts;
 pub(crate) use suns::MAX_SUNS;

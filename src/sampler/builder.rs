@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use super::energy::Emission;
+use super::energy::Energies;
 use super::lights::{LightSampler, NO_AREA, NO_LEAF};
 use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
 use crate::blas::{self, Prepared, Root, Texture};
@@ -122,14 +122,14 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
 
     fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N, M>, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
-        let emission = Emission::new(&environment, &[]);
-        let sends = parallel::collect(self.triangles.len(), |i| emission.energy(&self.triangles[i]) > 0.0);
+        let energies = Energies::new(&environment, &[]);
+        let sends = parallel::collect(self.triangles.len(), |i| energies.energy(&self.triangles[i]) > 0.0);
         let sending: Vec<u32> = (0..).zip(sends).filter_map(|(i, sends)| sends.then_some(i)).collect();
         if sending.len() > MAX_LEAVES {
             return Err(Error(ErrorKind::TooMany { what: "light triangles", count: sending.len(), limit: MAX_LEAVES }));
         }
-        let total = emission.total(&self.triangles);
-        let bounds = |light: u32| emission.bounds(&self.triangles[sending[light as usize] as usize], total).0;
+        let total = energies.total(&self.triangles);
+        let bounds = |light: u32| energies.bounds(&self.triangles[sending[light as usize] as usize], total).0;
         let cancelled = |_| Error(ErrorKind::Cancelled);
         let (tlas, order) = tlas::build::<N>(sending.len(), &bounds, report).map_err(cancelled)?;
         let places = parallel::collect(order.len(), |leaf| sending[order[leaf] as usize]);

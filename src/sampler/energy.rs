@@ -12,7 +12,7 @@ use crate::parallel;
 const LEAST_ENERGY: f64 = 1e-30;
 
 /// What the energy of a triangle depends on besides itself.
-pub(super) struct Emission<'a> {
+pub(super) struct Energies<'a> {
     /// Mean radiance that portals show.
     mean: f64,
     /// Whether what portals show depends on the direction.
@@ -32,7 +32,7 @@ pub(super) fn storable(energy: f64) -> f32 {
     if energy > 0.0 { energy.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32 } else { 0.0 }
 }
 
-impl<'a> Emission<'a> {
+impl<'a> Energies<'a> {
     pub(super) fn new(environment: &Environment, scales: &'a [f32]) -> Self {
         Self { mean: f64::from(environment.mean_without_suns()), directional: !environment.is_constant(), scales }
     }

@@ -152,6 +152,11 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
         Lit::new(&self.triangles[leaf as usize], x, self.illumination, self.directional_environment())
     }
 
+    /// Whether anything is sent at all.
+    pub(super) fn sends(&self) -> bool {
+        self.energy > 0.0
+    }
+
     pub(super) fn has_portals(&self) -> bool {
         self.portals
     }
@@ -163,7 +168,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 
     /// What the tree over triangles asks for at a shading point.
     pub(super) fn scene<'s>(&'s self, x: &'s ShadingPoint) -> Scene<'s> {
-        Scene { x, triangles: self.triangles, environment: self.environment, sends: self.energy > 0.0 }
+        Scene { x, triangles: self.triangles, environment: self.environment, sends: self.sends() }
     }
 }
 

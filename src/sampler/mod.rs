@@ -1,9 +1,12 @@
 //! The facade that a host calls.
 
+mod at;
 mod builder;
 mod bytes;
 mod direction;
+mod emission;
 mod energy;
+mod forward;
 mod lights;
 mod mesh;
 mod pdf;
@@ -12,7 +15,9 @@ mod sample;
 mod split;
 mod suns;
 
+pub use at::PointSampler;
 pub use builder::LightSamplerBuilder;
+pub use emission::{Emission, EmissionSample};
 pub use lights::{LightSampler, LightSamplerView};
 pub use mesh::{Mesh, Sides, TextureId, Weight};
 pub use refit::MeshUpdate;

@@ -1,80 +1,54 @@
 //! Densities of a given point or triangle.
 
-use super::lights::{LightSampler, LightSamplerView};
+use super::at::PointSampler;
 use super::sample::{Drawn, follow, to_finite};
-use super::suns::Techniques;
 use crate::blas::Lattice;
 use crate::light::Lit;
-use crate::record::{Hit, ShadingPoint, TriangleId};
+use crate::record::{Hit, TriangleId};
 use crate::tlas::Splitting;
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
-    /// See [`LightSamplerView::pdf`].
-    #[inline]
-    pub fn pdf(&self, x: &ShadingPoint, hit: &Hit) -> f32 {
-        self.as_view().pdf(x, hit)
-    }
-
-    /// See [`LightSamplerView::pmf`].
-    #[inline]
-    pub fn pmf(&self, x: &ShadingPoint, triangle: TriangleId) -> f32 {
-        self.as_view().pmf(x, triangle)
-    }
-}
-
-impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
+impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Density per solid angle with which [`Self::sample`] draws this point of this triangle. Zero where it cannot;
     /// infinity nowhere.
     ///
     /// Where a ray can cross several portals, what a host wants is [`Self::pdf_direction`].
-    pub fn pdf(&self, x: &ShadingPoint, hit: &Hit) -> f32 {
-        self.pdf_of_hit(x, hit, &self.techniques(x), None)
+    pub fn pdf(&self, hit: &Hit) -> f32 {
+        self.pdf_of_hit(hit, None)
     }
 
     /// Probability with which the trees choose this triangle, in `[0, 1]`. Where suns of the environment are seen
     /// through portals, samples that are drawn towards them come on top; without any, this is the probability with
     /// which [`Self::sample`] chooses it.
-    pub fn pmf(&self, x: &ShadingPoint, triangle: TriangleId) -> f32 {
-        let trees = self.techniques(x).trees;
-        self.leaf(triangle).map_or(0.0, |leaf| (trees * self.tree_count(leaf, x, None)) as f32)
+    pub fn pmf(&self, triangle: TriangleId) -> f32 {
+        self.lights.leaf(triangle).map_or(0.0, |leaf| (self.techniques.trees * self.tree_count(leaf, None)) as f32)
     }
 
     /// Probability of a triangle by the trees, or expected number of visits if they are split.
-    pub(super) fn tree_count(&self, leaf: u32, x: &ShadingPoint, splitting: Option<&Splitting>) -> f64 {
+    pub(super) fn tree_count(&self, leaf: u32, splitting: Option<&Splitting>) -> f64 {
+        let scene = self.lights.scene(&self.x);
         match splitting {
-            None => self.tlas.pmf(leaf, x, &self.scene(x)),
-            Some(splitting) => self.tlas.expected_count(leaf, x, &self.scene(x), splitting),
+            None => self.lights.tlas.pmf(leaf, &self.x, &scene),
+            Some(splitting) => self.lights.tlas.expected_count(leaf, &self.x, &scene, splitting),
         }
     }
 
     /// Density per solid angle of a hit by all techniques.
-    pub(super) fn pdf_of_hit(
-        &self,
-        x: &ShadingPoint,
-        hit: &Hit,
-        techniques: &Techniques,
-        splitting: Option<&Splitting>,
-    ) -> f32 {
-        let Some(leaf) = self.leaf(hit.triangle) else { return 0.0 };
-        let Some(lit) = self.lit(leaf, x) else { return 0.0 };
+    pub(super) fn pdf_of_hit(&self, hit: &Hit, splitting: Option<&Splitting>) -> f32 {
+        let Some(leaf) = self.lights.leaf(hit.triangle) else { return 0.0 };
+        let Some(lit) = self.lights.lit(leaf, &self.x) else { return 0.0 };
         let place = Lattice::from_barycentrics(hit.barycentrics);
-        let tree_pdf = self.tree_pdf(leaf, place, x, &lit, splitting);
-        let drawn = Drawn { leaf, place, count: 0.0, tree_pdf };
-        to_finite(self.mixed_pdf(&drawn, lit.point(place), x, techniques))
+        let count = self.tree_count(leaf, splitting);
+        let drawn = Drawn { leaf, place, count, tree_pdf: self.tree_pdf(leaf, count, place, &lit) };
+        to_finite(self.mixed_pdf(&drawn, lit.point(place)))
     }
 
-    /// Density per solid angle of a point of the triangle in a leaf by the trees.
-    pub(super) fn tree_pdf(
-        &self,
-        leaf: u32,
-        place: Lattice,
-        x: &ShadingPoint,
-        lit: &Lit<'_>,
-        splitting: Option<&Splitting>,
-    ) -> f64 {
-        match self.tree_count(leaf, x, splitting) {
+    /// Density per solid angle by the trees of a point of a triangle, which they choose so often.
+    pub(super) fn tree_pdf(&self, leaf: u32, count: f64, place: Lattice, lit: &Lit<'_>) -> f64 {
+        match count {
             0.0 => 0.0,
-            count => count * follow(self.cells, self.triangles[leaf as usize].root, lit, place).unwrap_or(0.0),
+            count => {
+                count * follow(self.lights.cells, self.lights.triangles[leaf as usize].root, lit, place).unwrap_or(0.0)
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::energy::{Emission, storable};
+use super::energy::{Energies, storable};
 use super::lights::{LightSampler, NO_AREA};
 use super::mesh::check_triangles;
 use crate::blas;
@@ -71,9 +71,9 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
 
     /// Gives the tree the bounds of the triangles as they are.
     pub(super) fn fit(&mut self) {
-        let emission = Emission::new(&self.environment, &self.scales);
-        let total = emission.total(&self.triangles);
-        self.cost = self.tlas.fit(&|leaf| emission.bounds(&self.triangles[leaf as usize], total));
+        let energies = Energies::new(&self.environment, &self.scales);
+        let total = energies.total(&self.triangles);
+        self.cost = self.tlas.fit(&|leaf| energies.bounds(&self.triangles[leaf as usize], total));
         self.energy = storable(total);
     }
 

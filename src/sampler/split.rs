@@ -3,39 +3,13 @@
 use glam::Vec3;
 use smallvec::{Array, SmallVec};
 
-use super::lights::{LightSampler, LightSamplerView};
+use super::at::PointSampler;
 use super::sample::to_finite;
-use crate::record::{Hit, LightSample, ShadingPoint};
+use crate::record::{Hit, LightSample};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
-    /// See [`LightSamplerView::sample_split`].
-    #[inline]
-    pub fn sample_split<A: Array<Item = LightSample>>(
-        &self,
-        x: &ShadingPoint,
-        u: [f32; 3],
-        splitting: &Splitting,
-        samples: &mut SmallVec<A>,
-    ) {
-        self.as_view().sample_split(x, u, splitting, samples);
-    }
-
-    /// See [`LightSamplerView::pdf_split`].
-    #[inline]
-    pub fn pdf_split(&self, x: &ShadingPoint, hit: &Hit, splitting: &Splitting) -> f32 {
-        self.as_view().pdf_split(x, hit, splitting)
-    }
-
-    /// See [`LightSamplerView::pdf_split_direction`].
-    #[inline]
-    pub fn pdf_split_direction(&self, x: &ShadingPoint, direction: Vec3, splitting: &Splitting) -> f32 {
-        self.as_view().pdf_split_direction(x, direction, splitting)
-    }
-}
-
-impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
+impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Draws one point from each part of the light tree that adaptive splitting visits (Conty Estevez and Kulla
     /// 2018), and one towards a sun if any is seen, and appends them to `samples`, which allocates only if they do not fit inline.
     ///
@@ -43,7 +17,6 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     /// expected number of samples per measure, and `pmf` the expected number on that triangle.
     pub fn sample_split<A: Array<Item = LightSample>>(
         &self,
-        x: &ShadingPoint,
         u: [f32; 3],
         splitting: &Splitting,
         samples: &mut SmallVec<A>,
@@ -54,36 +27,41 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             let key = 4 * u64::from(draw) + i as u64;
             Variate::scrambled(u[i], key, salt ^ key)
         };
-        let techniques = self.techniques(x).side_by_side();
+        let this = self.side_by_side();
         let mut visits = 0;
-        self.tlas.sample_split(
-            x,
-            &self.scene(x),
+        self.lights.tlas.sample_split(
+            &self.x,
+            &self.lights.scene(&self.x),
             splitting,
             |draw| variate(draw, 0),
             |leaf, count| {
                 let point = [variate(visits, 1), variate(visits, 2)];
-                samples.extend(self.sample_on(leaf, count, x, point, &techniques));
+                samples.extend(this.sample_on(leaf, count, point));
                 visits += 1;
             },
         );
         // A draw that no part of the tree has.
         let last = u32::MAX >> 2;
-        if let Some(sun) = techniques.choose_sun(&mut variate(last, 0)) {
+        if let Some(sun) = this.techniques.choose_sun(&mut variate(last, 0)) {
             let point = [variate(last, 1), variate(last, 2)];
-            samples.extend(self.sample_sun(sun, x, point, &techniques, Some(splitting)));
+            samples.extend(this.sample_sun(sun, point, Some(splitting)));
         }
     }
 
     /// Expected density per solid angle of the samples of [`Self::sample_split`] at a point of a triangle, for
     /// multiple importance sampling.
-    pub fn pdf_split(&self, x: &ShadingPoint, hit: &Hit, splitting: &Splitting) -> f32 {
-        self.pdf_of_hit(x, hit, &self.techniques(x).side_by_side(), Some(splitting))
+    pub fn pdf_split(&self, hit: &Hit, splitting: &Splitting) -> f32 {
+        self.side_by_side().pdf_of_hit(hit, Some(splitting))
     }
 
     /// Expected density per solid angle of the samples of [`Self::sample_split`] in a direction: the sum over all
     /// points that the ray crosses.
-    pub fn pdf_split_direction(&self, x: &ShadingPoint, direction: Vec3, splitting: &Splitting) -> f32 {
-        to_finite(self.direction_density(x, direction, &self.techniques(x).side_by_side(), Some(splitting)))
+    pub fn pdf_split_direction(&self, direction: Vec3, splitting: &Splitting) -> f32 {
+        to_finite(self.side_by_side().direction_density(direction, Some(splitting)))
+    }
+
+    /// The trees in any case, and one of the suns next to them.
+    fn side_by_side(&self) -> Self {
+        Self { techniques: self.techniques.side_by_side(), ..*self }
     }
 }

@@ -8,6 +8,7 @@ use core::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::at::PointSampler;
 use super::lights::LightSamplerView;
 use crate::blas::{self, Lattice, Shape};
 use crate::env::MAX_SUNS;
@@ -167,24 +168,31 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         });
         first
     }
+}
 
-    /// Density per solid angle of a direction by the suns, if the point on this leaf is where it first crosses a
-    /// portal; of the direction as such for no leaf.
+impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+    /// Density per solid angle of a direction by the suns, unless it first crosses a portal in one leaf.
+    pub(super) fn sun_density(&self, direction: Vec3, except: Option<u32>) -> f64 {
+        self.sun_density_if(direction, |leaf| Some(leaf) != except)
+    }
+
+    /// Density per solid angle of a direction by the suns, if it first crosses a portal in this leaf.
+    pub(super) fn sun_density_at(&self, direction: Vec3, leaf: u32) -> f64 {
+        self.sun_density_if(direction, |first| first == leaf)
+    }
+
     #[inline]
-    pub(super) fn sun_density(
-        &self,
-        x: &ShadingPoint,
-        direction: Vec3,
-        leaf: Option<u32>,
-        techniques: &Techniques,
-    ) -> f64 {
-        let Some((sun, pdf)) = self.environment.sun_at(direction) else { return 0.0 };
-        let chosen = techniques.sun(sun);
+    fn sun_density_if(&self, direction: Vec3, counts: impl Fn(u32) -> bool) -> f64 {
+        if self.techniques.is_trees() {
+            return 0.0;
+        }
+        let Some((sun, pdf)) = self.lights.environment.sun_at(direction) else { return 0.0 };
+        let chosen = self.techniques.sun(sun);
         if chosen == 0.0 {
             return 0.0;
         }
-        let Some(crossing) = self.crossing(x, direction) else { return 0.0 };
-        if leaf.is_none_or(|leaf| leaf == crossing.leaf) { chosen * f64::from(pdf) } else { 0.0 }
+        let crossing = self.lights.crossing(&self.x, direction);
+        if crossing.is_some_and(|crossing| counts(crossing.leaf)) { chosen * f64::from(pdf) } else { 0.0 }
     }
 }
 

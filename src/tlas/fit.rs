@@ -8,11 +8,13 @@ use super::node::{Child, Node, Spread, Tlas};
 use crate::bounds::{LightBounds, Moments};
 use crate::parallel;
 
-/// A node and all nodes below it, which follow it in memory.
+/// A node and all nodes below it, which are neighbours in memory.
 struct Subtree<'a, const N: usize> {
-    /// Number of the first node.
+    node: &'a mut Node<N>,
+    spread: &'a mut Spread,
+    /// Number of the first node below.
     first: usize,
-    nodes: &'a mut [Node<N>],
+    below: &'a mut [Node<N>],
     spreads: &'a mut [Spread],
     fitted: Fitted,
 }
@@ -34,11 +36,9 @@ impl<const N: usize> Tlas<N> {
     /// Gives all nodes the bounds of the lights below, and tells the tree's cost: that of all clusters in the surface
     /// area orientation heuristic, relative to that of the root.
     pub(crate) fn fit(&mut self, light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync)) -> f64 {
-        if self.nodes.is_empty() {
-            return 1.0;
-        }
-        let (nodes, spreads) = (&mut self.nodes[..], &mut self.spreads[..]);
-        let root = Subtree { first: 0, nodes, spreads, fitted: Fitted::NONE }.fit(light);
+        let [node, below @ ..] = &mut self.nodes[..] else { return 1.0 };
+        let [spread, spreads @ ..] = &mut self.spreads[..] else { return 1.0 };
+        let root = Subtree { node, spread, first: 1, below, spreads, fitted: Fitted::NONE }.fit(light);
         if root.sum > 0.0 {
             let scale = 1.0 / root.sum;
             self.spreads.iter_mut().for_each(|spread| spread.scale(scale));
@@ -49,56 +49,55 @@ impl<const N: usize> Tlas<N> {
 }
 
 impl<const N: usize> Subtree<'_, N> {
-    fn fit(self, light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync)) -> Fitted {
-        let count = self.nodes.len();
-        let (root, below) = self.nodes.split_at_mut(1);
-        let (spread, spreads) = self.spreads.split_at_mut(1);
-        let mut subtrees = divide(&root[0], self.first + 1, below, spreads);
-        parallel::for_each(&mut subtrees, count, |subtree| subtree.fitted = subtree.take().fit(light));
-        let mut whole = Fitted::NONE;
+    fn fit(&mut self, light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync)) -> Fitted {
+        let mut subtrees = divide(self.node, self.first, self.below, self.spreads);
+        let size = subtrees.iter().map(|subtree| 1 + subtree.below.len()).sum();
+        parallel::for_each(&mut subtrees, size, |subtree| subtree.fitted = subtree.fit(light));
         let mut subtrees = subtrees.iter();
-        for lane in 0..N {
-            let child = root[0].child(lane);
-            let fitted = match child {
-                Child::Empty => continue,
-                Child::Leaf(leaf) => Fitted::leaf(light(leaf)),
-                Child::Node(_) => subtrees.next().map_or(Fitted::NONE, |subtree| subtree.fitted),
-            };
-            root[0].set(lane, child, &fitted.bounds, &fitted.moments);
-            whole = if lane == 0 { fitted } else { whole.union(&fitted) };
-            whole.cost += fitted.bounds.cost();
-        }
-        spread[0] = whole.spread();
-        whole
-    }
-
-    /// The same, with nothing left behind.
-    fn take(&mut self) -> Subtree<'_, N> {
-        Subtree { first: self.first, nodes: self.nodes, spreads: self.spreads, fitted: self.fitted }
+        let lanes: SmallVec<[Fitted; 16]> = (0..N)
+            .filter_map(|lane| match self.node.child(lane) {
+                Child::Empty => None,
+                Child::Leaf(leaf) => Some(Fitted::leaf(light(leaf))),
+                Child::Node(_) => subtrees.next().map(|subtree| subtree.fitted),
+            })
+            .collect();
+        let known: SmallVec<[_; 16]> = lanes.iter().map(|lane| (lane.bounds, lane.moments)).collect();
+        self.node.set(&known);
+        let whole = lanes.iter().copied().reduce(|whole, lane| whole.union(&lane)).unwrap_or(Fitted::NONE);
+        *self.spread = whole.spread();
+        let cost = whole.cost + lanes.iter().map(|lane| lane.bounds.cost()).sum::<f64>();
+        Fitted { cost, ..whole }
     }
 }
 
-/// The subtrees below a node, whose first one begins with node number `first`.
+/// The subtrees below a node. Its child nodes come first, then what is below the first of them, and so on.
 fn divide<'a, const N: usize>(
     node: &Node<N>,
     first: usize,
-    mut nodes: &'a mut [Node<N>],
-    mut spreads: &'a mut [Spread],
+    nodes: &'a mut [Node<N>],
+    spreads: &'a mut [Spread],
 ) -> SmallVec<[Subtree<'a, N>; 16]> {
-    let starts: SmallVec<[usize; 16]> = (0..N)
-        .filter_map(|lane| match node.child(lane) {
-            Child::Node(index) => Some(index as usize),
-            Child::Leaf(_) | Child::Empty => None,
-        })
-        .collect();
     let end = first + nodes.len();
-    let ends = starts.iter().skip(1).copied().chain([end]);
-    let cut = |(&first, end): (&usize, usize)| {
-        let own_nodes = nodes.split_off_mut(..end - first).unwrap_or_default();
-        let own_spreads = spreads.split_off_mut(..end - first).unwrap_or_default();
-        Subtree { first, nodes: own_nodes, spreads: own_spreads, fitted: Fitted::NONE }
-    };
-    starts.iter().zip(ends).map(cut).collect()
+    let children = usize::from(node.node_count);
+    let (nodes, mut below) = nodes.split_at_mut(children);
+    let (own_spreads, mut spreads) = spreads.split_at_mut(children);
+    // Where the nodes below each child begin; those of the last one end with the slice.
+    let mut starts = [end; N];
+    let mut next = end;
+    for (start, child) in starts.iter_mut().zip(nodes.iter()).rev() {
+        next = if child.node_count > 0 { child.first_node as usize } else { next };
+        *start = next;
+    }
+    let mut subtrees = SmallVec::new();
+    for (i, (node, spread)) in nodes.iter_mut().zip(own_spreads).enumerate() {
+        let first = starts[i];
+        let count = starts.get(i + 1).copied().unwrap_or(end) - first;
+        let (mine, others) = below.split_at_mut(count);
+        let (mine_spreads, other_spreads) = spreads.split_at_mut(count);
+        (below, spreads) = (others, other_spreads);
+        subtrees.push(Subtree { node, spread, first, below: mine, spreads: mine_spreads, fitted: Fitted::NONE });
+    }
+    subtrees
 }
 
 impl Fitted {

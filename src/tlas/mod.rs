@@ -3,11 +3,14 @@
 //! It sees bounds and opaque leaf numbers only; what a leaf is, and what light arrives from behind a portal, it
 //! asks of the level above through [`Scene`].
 
+mod beam;
 mod bins;
 mod build;
 mod collapse;
 mod descend;
+mod encode;
 mod fit;
+mod forest;
 mod importance;
 mod node;
 mod progress;
@@ -17,6 +20,7 @@ mod split;
 mod tests;
 mod validate;
 
+pub(crate) use beam::{Beam, Outgoing};
 pub(crate) use build::build;
 pub(crate) use importance::Scene;
 pub(crate) use node::{MAX_LEAVES, Tlas, TlasView};

@@ -1,6 +1,6 @@
 //! The renderer's light sampling: every call of `fanlight` is in this file.
 
-use fanlight::{Environment, Filter, LightSampler, Mesh, ShadingPoint, Sides, Texture, Weight, Wrap};
+use fanlight::{Environment, Filter, LightSampler, Mesh, PointSampler, ShadingPoint, Sides, Texture, Weight, Wrap};
 use glam::Vec3;
 
 use super::Error;
@@ -52,23 +52,30 @@ impl Lighting {
         self.lights.environment().pdf(direction)
     }
 
-    /// A direction from `x` through a window, by what comes in there and reaches `x`.
-    pub(crate) fn sample_portals(&self, x: &SurfacePoint, u: [f32; 3]) -> Option<Proposal> {
-        let x = shading_point(x);
-        let sample = self.lights.sample(&x, u)?;
-        // Not `sample.pdf`, the density of this one point: were there another window behind this one, the same
-        // direction could have been found through that.
-        Some(Proposal { direction: sample.direction, pdf: self.lights.pdf_sample_direction(&x, &sample) })
-    }
-
-    /// Density per solid angle of a direction under [`sample_portals`](Self::sample_portals).
-    pub(crate) fn portal_pdf(&self, x: &SurfacePoint, direction: Vec3) -> f32 {
-        self.lights.pdf_direction(&shading_point(x), direction)
+    /// The windows as seen from a point.
+    pub(crate) fn portals_at(&self, x: &SurfacePoint) -> Portals<'_> {
+        Portals { lights: self.lights.at(&ShadingPoint::surface(x.position, x.normal)) }
     }
 }
 
-fn shading_point(x: &SurfacePoint) -> ShadingPoint {
-    ShadingPoint::surface(x.position, x.normal)
+/// The windows as seen from a point of a wall.
+pub(crate) struct Portals<'a> {
+    lights: PointSampler<'a>,
+}
+
+impl Portals<'_> {
+    /// A direction through a window, by what comes in there and reaches the point.
+    pub(crate) fn sample(&self, u: [f32; 3]) -> Option<Proposal> {
+        let sample = self.lights.sample(u)?;
+        // Not `sample.pdf`, the density of this one point: were there another window behind this one, the same
+        // direction could have been found through that.
+        Some(Proposal { direction: sample.direction, pdf: self.lights.pdf_sample_direction(&sample) })
+    }
+
+    /// Density per solid angle of a direction under [`sample`](Self::sample).
+    pub(crate) fn pdf(&self, direction: Vec3) -> f32 {
+        self.lights.pdf_direction(direction)
+    }
 }
 
 /// How much light each place of a window lets through, read as the ray caster reads it.

@@ -5,7 +5,7 @@ use core::f32::consts::{FRAC_1_PI, TAU};
 use glam::{Vec2, Vec3};
 use rand_pcg::{Pcg32, rand_core::Rng};
 
-use super::lighting::Proposal;
+use super::lighting::{Portals, Proposal};
 use super::scene::SurfacePoint;
 use super::world::World;
 
@@ -51,10 +51,14 @@ impl PathTracer<'_> {
         let mut radiance = Vec3::ZERO;
         let mut throughput = 1.0;
         for _ in 0..self.bounces {
-            radiance += throughput * self.light_by_light_samples(&x, random);
+            let portals = self.portals_at(&x);
+            radiance += throughput * self.light_by_light_samples(&x, portals.as_ref(), random);
             let direction = sample_cosine(x.normal, random.take());
             let Some(next) = self.world.scene.trace(x.position, direction) else {
-                return radiance + throughput * self.reflected(&x, direction, self.density(&x, direction));
+                let density = cosine_pdf(x.normal, direction)
+                    + self.world.lighting.environment_pdf(direction)
+                    + portal_pdf(portals.as_ref(), direction);
+                return radiance + throughput * self.reflected(&x, direction, density);
             };
             throughput *= ALBEDO;
             x = next;
@@ -62,17 +66,19 @@ impl PathTracer<'_> {
         radiance
     }
 
+    /// The windows, if they are sampled.
+    fn portals_at(&self, x: &SurfacePoint) -> Option<Portals<'_>> {
+        (self.strategy == Strategy::EnvironmentAndPortals).then(|| self.world.lighting.portals_at(x))
+    }
+
     /// Direct light by one direction of each light sampler.
-    fn light_by_light_samples(&self, x: &SurfacePoint, random: &mut Random) -> Vec3 {
-        let mut sum = self.light_along(x, self.world.lighting.sample_environment(random.take()), |direction| {
-            self.portal_pdf(x, direction)
-        });
-        if self.strategy == Strategy::EnvironmentAndPortals {
-            sum += self.light_along(x, self.world.lighting.sample_portals(x, random.take()), |direction| {
-                self.world.lighting.environment_pdf(direction)
-            });
-        }
-        sum
+    fn light_by_light_samples(&self, x: &SurfacePoint, portals: Option<&Portals<'_>>, random: &mut Random) -> Vec3 {
+        let lighting = &self.world.lighting;
+        let by_environment =
+            self.light_along(x, lighting.sample_environment(random.take()), |direction| portal_pdf(portals, direction));
+        let Some(portals) = portals else { return by_environment };
+        by_environment
+            + self.light_along(x, portals.sample(random.take()), |direction| lighting.environment_pdf(direction))
     }
 
     /// Direct light along a proposed direction, whose density under the other light sampler is `other_pdf`.
@@ -92,19 +98,11 @@ impl PathTracer<'_> {
     fn reflected(&self, x: &SurfacePoint, direction: Vec3, density: f32) -> Vec3 {
         ALBEDO * cosine_pdf(x.normal, direction) / density * self.world.sky.radiance(direction)
     }
+}
 
-    /// Sum of a direction's densities under all techniques.
-    fn density(&self, x: &SurfacePoint, direction: Vec3) -> f32 {
-        cosine_pdf(x.normal, direction) + self.world.lighting.environment_pdf(direction) + self.portal_pdf(x, direction)
-    }
-
-    /// A direction's density under portal sampling: zero where portals are not sampled.
-    fn portal_pdf(&self, x: &SurfacePoint, direction: Vec3) -> f32 {
-        match self.strategy {
-            Strategy::Environment => 0.0,
-            Strategy::EnvironmentAndPortals => self.world.lighting.portal_pdf(x, direction),
-        }
-    }
+/// A direction's density under portal sampling: zero where portals are not sampled.
+fn portal_pdf(portals: Option<&Portals<'_>>, direction: Vec3) -> f32 {
+    portals.map_or(0.0, |portals| portals.pdf(direction))
 }
 
 /// A unit direction with the density of [`cosine_pdf`].

@@ -1,0 +1,32 @@
+//! A shading point's own sampler: what all questions about one point have in common is found once.
+
+use super::lights::{LightSampler, LightSamplerView};
+use super::suns::Techniques;
+use crate::record::ShadingPoint;
+
+/// The lights as seen from one shading point: [`LightSampler::at`].
+///
+/// Every question to a [`LightSampler`] begins with a search for the suns behind the portals. A host that asks more
+/// than one at the same point saves all searches but the first; the answers are the same.
+#[derive(Clone, Copy, Debug)]
+pub struct PointSampler<'a, const N: usize = 8, const M: usize = 4> {
+    pub(super) lights: LightSamplerView<'a, N, M>,
+    pub(super) x: ShadingPoint,
+    pub(super) techniques: Techniques,
+}
+
+impl<const N: usize, const M: usize> LightSampler<N, M> {
+    /// The lights as seen from one shading point, for more than one question about it.
+    #[inline]
+    pub fn at(&self, x: &ShadingPoint) -> PointSampler<'_, N, M> {
+        self.as_view().at(x)
+    }
+}
+
+impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+    /// The lights as seen from one shading point, for more than one question about it.
+    #[inline]
+    pub fn at(&self, x: &ShadingPoint) -> PointSampler<'a, N, M> {
+        PointSampler { lights: *self, x: *x, techniques: self.techniques(x) }
+    }
+}
