@@ -71,8 +71,8 @@ impl<const N: usize> Node<N> {
             && usize::from(self.width) <= N
             && origin.iter().all(|value| value.abs() <= FAR)
             && steps.iter().all(|&step| (0.0..=FAR).contains(&wide(step)))
-            && energies.map(|(lane, energy)| (lane < self.width.into(), energy)).all(|(is_child, energy)| {
-                if is_child { energy >= 0.0 && energy < f32::INFINITY } else { energy == 0.0 }
-            })
+            && energies
+                .map(|(lane, energy)| (lane < self.width.into(), energy))
+                .all(|(is_child, energy)| if is_child { (0.0..f32::INFINITY).contains(&energy) } else { energy == 0.0 })
     }
 }
