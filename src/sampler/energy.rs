@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::mesh::mesh_of;
 use crate::bounds::{LightBounds, Moments};
 use crate::env::Environment;
 use crate::geometry::{Aabb, Cone};
@@ -17,14 +18,24 @@ pub(super) struct Energies<'a> {
     mean: f64,
     /// Whether what portals show depends on the direction.
     directional: bool,
-    /// See [`scale_of`].
-    scales: &'a [f32],
+    scales: Scales<'a>,
 }
 
-/// What the weights of a light's mesh are multiplied by since the build; without entries, nothing.
-#[inline]
-pub(super) fn scale_of(scales: &[f32], light: &LightTriangle) -> f32 {
-    scales.get(light.id[0] as usize).copied().unwrap_or(1.0)
+/// What the weights of each mesh are multiplied by since the build; without factors, nothing.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Scales<'a> {
+    pub(super) factors: &'a [f32],
+    pub(super) meshes: &'a [u32],
+}
+
+impl Scales<'_> {
+    #[inline]
+    pub(super) fn of(&self, light: &LightTriangle) -> f32 {
+        if self.factors.is_empty() {
+            return 1.0;
+        }
+        self.factors.get(mesh_of(self.meshes, light.place())).copied().unwrap_or(1.0)
+    }
 }
 
 /// An energy in single precision, zero only if it is zero.
@@ -33,7 +44,7 @@ pub(super) fn storable(energy: f64) -> f32 {
 }
 
 impl<'a> Energies<'a> {
-    pub(super) fn new(environment: &Environment, scales: &'a [f32]) -> Self {
+    pub(super) fn new(environment: &Environment, scales: Scales<'a>) -> Self {
         Self { mean: f64::from(environment.mean_without_suns()), directional: !environment.is_constant(), scales }
     }
 
@@ -51,7 +62,7 @@ impl<'a> Energies<'a> {
 
     fn energy_of(&self, light: &LightTriangle, area: f32) -> f64 {
         let radiance = if light.is_portal() { self.mean } else { 1.0 };
-        let weight = f64::from(light.root.average) * f64::from(scale_of(self.scales, light));
+        let weight = f64::from(light.root.average) * f64::from(self.scales.of(light));
         weight * f64::from(area) * radiance
     }
 

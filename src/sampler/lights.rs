@@ -5,7 +5,8 @@ use alloc::vec::Vec;
 use glam::Vec3;
 
 use super::builder::LightSamplerBuilder;
-use super::energy::scale_of;
+use super::energy::Scales;
+use super::mesh::mesh_of;
 use crate::blas;
 use crate::env::{Environment, EnvironmentView, Footprint};
 use crate::light::{Illumination, LightTriangle, Lit};
@@ -141,10 +142,17 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
         self.leaves.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
     }
 
+    /// The triangle in a leaf.
+    pub(super) fn id(&self, leaf: u32) -> TriangleId {
+        let place = self.triangles[leaf as usize].place();
+        let mesh = mesh_of(self.meshes, place);
+        TriangleId { mesh: mesh as u32, triangle: place.wrapping_sub(self.meshes[mesh]) }
+    }
+
     /// What the weight of a triangle is multiplied by.
     #[inline]
     pub(super) fn scale(&self, light: &LightTriangle) -> f32 {
-        scale_of(self.scales, light)
+        Scales { factors: self.scales, meshes: self.meshes }.of(light)
     }
 
     /// A triangle as seen from a shading point; `None` if nothing can arrive from it.

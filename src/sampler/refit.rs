@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::energy::{Energies, storable};
+use super::energy::{Energies, Scales, storable};
 use super::lights::{LightSampler, NO_AREA};
 use super::mesh::check_triangles;
 use crate::blas;
@@ -71,7 +71,8 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
 
     /// Gives the tree the bounds of the triangles as they are.
     pub(super) fn fit(&mut self) {
-        let energies = Energies::new(&self.environment, &self.scales);
+        let scales = Scales { factors: &self.scales, meshes: &self.meshes };
+        let energies = Energies::new(&self.environment, scales);
         let total = energies.total(&self.triangles);
         self.cost = self.tlas.fit(&|leaf| energies.bounds(&self.triangles[leaf as usize], total));
         self.energy = storable(total);
