@@ -7,7 +7,7 @@ use super::illumination::{Illumination, Views, horizon, is_below};
 use crate::blas::{self, Cell, Lattice, Parts, Root, Shape, Worth, Worths};
 use crate::env::{EnvironmentView, Footprint};
 use crate::geometry::{self, Triangle};
-use crate::record::{Receiver, ShadingPoint, TriangleId};
+use crate::record::{Receiver, ShadingPoint};
 
 /// Largest coordinate of a vertex: squares of squares of distances must not overflow where the tree is built.
 pub(crate) const POSITION_LIMIT: f32 = 1e9;
@@ -28,40 +28,41 @@ const NEAR: f32 = 1.0 / 256.0;
 pub(crate) struct LightTriangle {
     /// Counter-clockwise around the front side.
     pub(crate) vertices: [[f32; 3]; 3],
-    /// Number of the mesh, and of the triangle in it.
-    pub(crate) id: [u32; 2],
     /// The tree over its texture.
     pub(crate) root: Root,
-    /// [`Self::TWO_SIDED`] and [`Self::PORTAL`].
-    pub(crate) flags: u32,
+    /// Its number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`].
+    pub(crate) place_and_flags: u32,
 }
+
+const _: () = assert!(size_of::<LightTriangle>() == 48);
 
 impl LightTriangle {
     /// Sends from its back as well.
-    pub(crate) const TWO_SIDED: u32 = 1;
+    pub(crate) const TWO_SIDED: u32 = 1 << 31;
     /// Shows the environment behind it.
-    pub(crate) const PORTAL: u32 = 2;
+    pub(crate) const PORTAL: u32 = 1 << 30;
 
     pub(crate) fn triangle(&self) -> Triangle {
         Triangle(self.vertices.map(Vec3::from))
     }
 
-    pub(crate) fn id(&self) -> TriangleId {
-        TriangleId { mesh: self.id[0], triangle: self.id[1] }
+    /// Its number among all triangles that were added.
+    pub(crate) fn place(&self) -> u32 {
+        self.place_and_flags & !(Self::TWO_SIDED | Self::PORTAL)
     }
 
     pub(crate) fn is_two_sided(&self) -> bool {
-        self.flags & Self::TWO_SIDED != 0
+        self.place_and_flags & Self::TWO_SIDED != 0
     }
 
     pub(crate) fn is_portal(&self) -> bool {
-        self.flags & Self::PORTAL != 0
+        self.place_and_flags & Self::PORTAL != 0
     }
 
     /// Whether the numbers, which may come from outside, are those of a triangle.
     pub(crate) fn is_valid(&self) -> bool {
         let in_range = self.vertices.as_flattened().iter().all(|x| x.abs() <= POSITION_LIMIT);
-        in_range && self.flags & !(Self::TWO_SIDED | Self::PORTAL) == 0 && self.root.average > 0.0
+        in_range && self.root.average > 0.0
     }
 
     /// Whether anything can travel from the triangle to the shading point: the point is on a side that sends, and

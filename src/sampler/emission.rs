@@ -225,6 +225,9 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
 
     /// A point of a triangle by the averages of its texture, as a guide leads.
     fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, Domain) -> Lattice) -> Option<Start> {
+        if !self.lights.sends() {
+            return None;
+        }
         let light = &self.lights.triangles[leaf as usize];
         if self.lights.scale(light) == 0.0 {
             return None;
@@ -246,10 +249,7 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
 
     fn ray(&self, leaf: u32, start: &Start, direction: Vec3, pdf: f64, pmf: f64) -> EmissionSample {
         EmissionSample {
-            hit: Hit {
-                triangle: self.lights.triangles[leaf as usize].id(),
-                barycentrics: start.place.to_barycentrics(),
-            },
+            hit: Hit { triangle: self.lights.id(leaf), barycentrics: start.place.to_barycentrics() },
             position: start.position.as_vec3(),
             normal: start.normal,
             direction,

@@ -53,10 +53,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
         let distance = relative.length();
         let positive = pdf > 0.0 && distance > 0.0 && distance.is_finite();
         positive.then(|| LightSample {
-            hit: Hit {
-                triangle: self.lights.triangles[drawn.leaf as usize].id(),
-                barycentrics: drawn.place.to_barycentrics(),
-            },
+            hit: Hit { triangle: self.lights.id(drawn.leaf), barycentrics: drawn.place.to_barycentrics() },
             position: (self.x.position.as_dvec3() + relative).as_vec3(),
             normal: lit.normal,
             direction: (relative / distance).as_vec3(),

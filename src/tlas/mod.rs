@@ -6,6 +6,7 @@
 mod beam;
 mod bins;
 mod build;
+mod cluster;
 mod collapse;
 mod descend;
 mod encode;
