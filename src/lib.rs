@@ -50,6 +50,9 @@
 //! The first and the third go together in multiple importance sampling, and so do the second and the fourth. A
 //! portal does not end a ray: where a second portal may lie on the way, use the first and the third.
 //!
+//! Several calls at one point share work through [`LightSampler::at`]. Photons start with [`LightSampler::emission`];
+//! those of a point light are drawn with [`sample`](LightSampler::sample) from a [`ShadingPoint::volume`] at its place.
+//!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them
 //! with BSDF samples, or with [`Environment::sample`].
 //!
@@ -135,6 +138,8 @@ struct Readme;
 pub use blas::Texture;
 pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSample, EnvironmentView, Sun, SunTexel};
 pub use error::Error;
+/// The vectors of the interface.
+pub use glam;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
 pub use sampler::{

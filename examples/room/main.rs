@@ -48,7 +48,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     let world = World::new(arguments.window, arguments.opening, sky(arguments)?)?;
 
     let render = |name: &str, strategy: Strategy, seed: u32, budget: Budget| {
-        let tracer = PathTracer { world: &world, strategy, bounces: arguments.bounces };
+        let tracer = PathTracer::new(&world, strategy, arguments.bounces);
         with_progress_bar(name, &Progressive { tracer, camera, seed }, budget)
     };
     let (seed, budget) = (arguments.seed, arguments.budget);

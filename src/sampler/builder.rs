@@ -30,7 +30,7 @@ pub struct LightSamplerBuilder<'a, const N: usize = 8, const M: usize = 4> {
     places: Vec<u32>,
     /// Where each mesh starts in `places`, and the end.
     meshes: Vec<u32>,
-    cells: Vec<blas::Node<M>>,
+    cells: Vec<blas::Block<M>>,
     /// Trees over textures by texture and the bits of the three uvs.
     shared: BTreeMap<(usize, [u32; 6]), Root>,
 }
@@ -91,7 +91,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
                 self.triangles.truncate(before.0);
                 self.places.truncate(before.1);
                 self.cells.truncate(before.2);
-                self.shared.retain(|_, root| root.node == blas::LEAF || (root.node as usize) < before.2);
+                self.shared.retain(|_, root| blas::holds(&self.cells, *root));
                 return Err(error);
             }
         }
@@ -219,7 +219,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         if let Some(&root) = self.shared.get(&key) {
             return Ok(root);
         }
-        let root = blas::build(&self.textures[texture], uvs, &mut self.cells)?;
+        let root = blas::build(&mut self.textures[texture], uvs, &mut self.cells)?;
         self.shared.insert(key, root);
         Ok(root)
     }

@@ -1,6 +1,8 @@
 //! The renderer's light sampling: every call of `fanlight` is in this file.
 
-use fanlight::{Environment, Filter, LightSampler, Mesh, PointSampler, ShadingPoint, Sides, Texture, Weight, Wrap};
+use fanlight::{
+    Emission, Environment, Filter, LightSampler, Mesh, PointSampler, ShadingPoint, Sides, Texture, Weight, Wrap,
+};
 use glam::Vec3;
 
 use super::Error;
@@ -52,9 +54,40 @@ impl Lighting {
         self.lights.environment().pdf(direction)
     }
 
+    /// The light that comes in.
+    pub(crate) fn incoming(&self) -> Incoming<'_> {
+        Incoming { emission: self.lights.emission() }
+    }
+
     /// The windows as seen from a point.
     pub(crate) fn portals_at(&self, x: &SurfacePoint) -> Portals<'_> {
         Portals { lights: self.lights.at(&ShadingPoint::surface(x.position, x.normal)) }
+    }
+}
+
+/// A ray of light.
+pub(crate) struct LightRay {
+    pub(crate) origin: Vec3,
+    /// Where the light travels to.
+    pub(crate) direction: Vec3,
+}
+
+/// The light that comes in through the windows, whatever it falls on.
+pub(crate) struct Incoming<'a> {
+    emission: Emission<'a>,
+}
+
+impl Incoming<'_> {
+    /// A ray from the sky through a window, by the light that it brings.
+    pub(crate) fn sample(&self, u: [f32; 5]) -> Option<LightRay> {
+        let ray = self.emission.sample(u)?;
+        Some(LightRay { origin: ray.position, direction: ray.direction })
+    }
+
+    /// Density with which [`sample`](Self::sample) gives the ray that comes to a point from a direction: per solid
+    /// angle, and per area perpendicular to the ray.
+    pub(crate) fn pdf(&self, position: Vec3, towards: Vec3) -> f32 {
+        self.emission.pdf_ray(position, towards)
     }
 }
 

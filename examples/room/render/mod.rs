@@ -2,7 +2,7 @@
 //!
 //! What it shares with [`lighting`], the only file that calls `fanlight`, is what any renderer has: a scene to cast
 //! rays into ([`scene`]), the radiance of the sky in RGB ([`sky`]), and an integrator that asks for directions and
-//! for densities of directions ([`path`]).
+//! for densities of directions ([`path`], and [`photon`] for those in which light comes in).
 
 mod camera;
 mod daylight;
@@ -11,6 +11,7 @@ mod film;
 mod lighting;
 mod mask;
 mod path;
+mod photon;
 mod progressive;
 mod room;
 mod scene;

@@ -76,6 +76,12 @@ impl Scene {
         self.bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, self.bvh.primitive_indices[slot] as usize))
     }
 
+    /// Whether nothing is between two free points.
+    pub(crate) fn sees(&self, from: Vec3, to: Vec3) -> bool {
+        let ray = Ray::new(from.into(), (to - from).into(), 0.0, 1.0);
+        self.bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, self.bvh.primitive_indices[slot] as usize))
+    }
+
     /// Distance to a triangle; infinite where the ray misses it or passes through its mask.
     fn intersect(&self, ray: &Ray, triangle: usize) -> f32 {
         let distance = self.triangles[triangle].intersect(ray);
