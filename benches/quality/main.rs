@@ -47,7 +47,7 @@ fn run(args: &Args) -> Result<(), Failure> {
             Part::Splitting => studies::splitting::run(args),
             Part::Lobes => studies::lobes::run(args),
             Part::Room => studies::room::run(args)?,
-            Part::Terms => studies::terms::run(),
+            Part::Terms => studies::terms::run(&args.effort),
         }
     }
     Ok(())

@@ -28,7 +28,7 @@ const LEAST_SHARE: f64 = 0.01;
 const MOST_TEXELS: usize = 256;
 
 /// Most texels of a sun, after merging: they bound what a shading point costs where a sun is seen in part.
-const MOST_BLOCKS: usize = 64;
+const MOST_BLOCKS: usize = 256;
 
 /// A cluster of bright texels.
 #[repr(C)]

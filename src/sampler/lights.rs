@@ -176,7 +176,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 
     /// What the tree over triangles asks for at a shading point.
     pub(super) fn scene<'s>(&'s self, x: &'s ShadingPoint) -> Scene<'s> {
-        Scene { x, triangles: self.triangles, environment: self.environment, sends: self.sends() }
+        Scene { x, triangles: self.triangles, environment: &self.environment, sends: self.sends() }
     }
 }
 
@@ -184,7 +184,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 pub(super) struct Scene<'a> {
     x: &'a ShadingPoint,
     triangles: &'a [LightTriangle],
-    environment: EnvironmentView<'a>,
+    environment: &'a EnvironmentView<'a>,
     /// Whether any triangle sends anything.
     sends: bool,
 }

@@ -109,9 +109,13 @@ pub(crate) fn pick_wide<const N: usize>(weights: &[f32; N], variate: &mut Variat
         return None;
     }
     let target = variate.value() * total;
-    // A value below one leaves the target below the total, so that a weight is found, and never one of zero.
-    let passed: i64 = ends.iter().map(|&end| i64::from(target >= end)).sum();
-    let chosen = (passed as usize).min(N - 1);
+    // A value below one leaves the target below the total, so that a weight is found, and never one of zero. By halves:
+    // of as many weights as a power of two.
+    let (mut chosen, mut half) = (0, N / 2);
+    while half > 0 {
+        chosen += if target >= ends[chosen + half - 1] { half } else { 0 };
+        half /= 2;
+    }
     let low = if chosen > 0 { ends[chosen - 1] } else { 0.0 };
     let width = f64::from(weights[chosen]);
     variate.stretch(target - low, width, total);

@@ -8,17 +8,15 @@ use std::time::Instant;
 use fanlight::{Filter, Hit, Illumination, LightSampler, Mesh, ShadingPoint, Sides, Texture, TriangleId, Weight, Wrap};
 use glam::{DVec3, Vec2, Vec3};
 
+use crate::args::Effort;
 use crate::parallel::parallel;
 use crate::scenes::pcg::Pcg32;
+use crate::timing::median;
 
 /// Cells along an edge of the triangle.
 const CELLS: u32 = 64;
 /// Texels along an edge of the image: 1,024 cells of half a texel cover the triangle.
 const TEXELS: usize = 32;
-/// Shading points of a row.
-const POINTS: usize = 400;
-/// Samples of a timing, and timings of which the fastest counts.
-const TIMING: (usize, usize) = (1 << 15, 7);
 
 const TERMS: [(&str, Option<Illumination>); 5] = [
     ("area only", None),
@@ -32,12 +30,12 @@ const TERMS: [(&str, Option<Illumination>); 5] = [
 const RANGES: [(&str, [f64; 2]); 3] = [("far", [2.0, 6.0]), ("mid", [0.5, 2.0]), ("near", [0.05, 0.5])];
 
 /// Prints the table.
-pub(crate) fn run() {
+pub(crate) fn run(effort: &Effort) {
     println!("| term | {} | ns |", rows().map(|(image, range)| format!("{}, {}", image.name(), range.0)).join(" | "));
     println!("| --- {}|", "| ---: ".repeat(7));
     for (name, term) in TERMS {
-        let cells = rows().map(|(image, (_, range))| measure(image, range, term));
-        let nanoseconds = term.map_or("-".to_owned(), |term| format!("{:.0}", nanoseconds(term)));
+        let cells = rows().map(|(image, (_, range))| measure(image, range, term, effort));
+        let nanoseconds = term.map_or("-".to_owned(), |term| format!("{:.0}", nanoseconds(term, effort)));
         println!("| {name} | {} | {nanoseconds} |", cells.join(" | "));
     }
 }
@@ -96,10 +94,10 @@ fn points(range: [f64; 2], count: usize) -> Vec<ShadingPoint> {
 }
 
 /// Mean relative variance over all points that light arrives at, and the median in brackets.
-fn measure(emission: Emission, range: [f64; 2], term: Option<Illumination>) -> String {
+fn measure(emission: Emission, range: [f64; 2], term: Option<Illumination>, effort: &Effort) -> String {
     let texels = emission.texels();
     let sampler = term.map(|term| sampler(&texels, term));
-    let points = points(range, POINTS);
+    let points = points(range, 4 * effort.study_points);
     let found = parallel(&points, |_, x| relative_variance(x, &texels, sampler.as_ref()));
     let mut found: Vec<f64> = found.into_iter().flatten().collect();
     found.sort_by(f64::total_cmp);
@@ -150,17 +148,17 @@ fn places() -> impl Iterator<Item = [f64; 2]> {
 }
 
 /// The time of a sample, at points of all ranges and with both emissions.
-fn nanoseconds(term: Illumination) -> f64 {
+fn nanoseconds(term: Illumination, effort: &Effort) -> f64 {
     let images = [Emission::Constant, Emission::Disc].map(Emission::texels);
     let samplers = images.each_ref().map(|texels| sampler(texels, term));
-    let points: Vec<_> = RANGES.iter().flat_map(|(_, range)| points(*range, POINTS)).collect();
+    let points: Vec<_> = RANGES.iter().flat_map(|(_, range)| points(*range, 4 * effort.study_points)).collect();
     let time = || {
         let mut pcg = Pcg32::new(3, 3);
         let start = Instant::now();
-        for i in 0..TIMING.0 {
+        for i in 0..effort.calls {
             black_box(samplers[i % 2].sample(&points[i % points.len()], pcg.uniform3()));
         }
-        start.elapsed().as_secs_f64() * 1e9 / TIMING.0 as f64
+        start.elapsed().as_secs_f64() * 1e9 / effort.calls as f64
     };
-    (0..TIMING.1).map(|_| time()).fold(f64::INFINITY, f64::min)
+    median((0..effort.repeats).map(|_| time()).collect())
 }
