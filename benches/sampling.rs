@@ -5,7 +5,7 @@
 
 use core::hint::black_box;
 
-use criterion::{Criterion, Throughput};
+use criterion::{BenchmarkId, Criterion, Throughput};
 use fanlight::{Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight};
 use glam::{DVec3, Vec3};
 
