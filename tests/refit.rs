@@ -121,7 +121,7 @@ fn the_density_integrates_to_one() {
         let (mut sum, mut unresolved, mut pmfs) = (0.0, 0.0, 0.0);
         for (m, t) in other.triangles() {
             let on = OnTriangle::new(&other, (m, t), &x, &pdf);
-            let (whole, open) = on.integrate(0, 3, &probes[m][t]);
+            let (whole, open) = on.integrate(0, 4, &probes[m][t]);
             sum += whole[0];
             unresolved += open;
             pmfs += f64::from(lights.pmf(&x, id((m, t))));

@@ -225,9 +225,6 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
 
     /// A point of a triangle by the averages of its texture, as a guide leads.
     fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, Domain) -> Lattice) -> Option<Start> {
-        if !self.lights.sends() {
-            return None;
-        }
         let light = &self.lights.triangles[leaf as usize];
         if self.lights.scale(light) == 0.0 {
             return None;

@@ -82,8 +82,11 @@ impl<const N: usize> Node<N> {
 
     fn set_energy(&mut self, lane: usize, bounds: &LightBounds) {
         let energy = bounds.energy();
-        // Exactly zero only for lights that are switched off.
-        self.energies[lane] = if energy > 0.0 { nearest(energy) } else { 0 };
+        if energy == 0.0 {
+            (self.energies[lane], self.portals[lane]) = (0, 0);
+            return;
+        }
+        self.energies[lane] = nearest(energy);
         let share = (bounds.portal / energy * 255.0 + 0.5) as u8;
         self.portals[lane] = match (bounds.flux > 0.0, bounds.portal > 0.0) {
             (_, false) => 0,
@@ -105,3 +108,6 @@ fn nearest(value: f32) -> u16 {
     let bits = (value.to_bits() + 0x8000) >> 16;
     (bits as u16).clamp(1, 0x7f7f)
 }
+
+#[cfg(test)]
+mod tests;
