@@ -6,7 +6,7 @@ use crate::env::{Cover, EnvironmentView, Opening};
 use crate::warp::Variate;
 
 /// A cell is small, and not looked into for how much of it is open, if it is this much smaller than a sun.
-const SMALL: f32 = 1.0;
+const SMALL: f32 = 0.5;
 
 /// A part of a triangle that a sun is seen through.
 #[derive(Clone, Copy, Debug)]
