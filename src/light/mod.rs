@@ -2,6 +2,7 @@
 
 mod illumination;
 mod triangle;
+mod worth;
 
 pub use illumination::Illumination;
 pub(crate) use triangle::{LightTriangle, Lit, POSITION_LIMIT};

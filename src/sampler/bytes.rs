@@ -16,7 +16,7 @@ use crate::tlas::TlasView;
 
 const MAGIC: [u8; 8] = *b"fanlight";
 /// Changes with every change of a layout.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Reads differently on a machine of the other byte order.
 const BYTE_ORDER: u32 = 0x0102_0304;
 const BUFFERS: usize = 13;
