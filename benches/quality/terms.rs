@@ -2,7 +2,7 @@
 //!
 //! No Monte Carlo: the density is asked for in the middle of 4,096 cells, and set against the true contribution.
 
-use std::hint::black_box;
+use core::hint::black_box;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -65,7 +65,7 @@ impl Emission {
         let value = |i: usize| {
             let [x, y] = [i % TEXELS, i / TEXELS].map(|k| k as f64 - 10.0);
             // A thousandth of contrast keeps the tree from ending early.
-            let ground = if i % 2 == 0 { 1.0 } else { 0.999 };
+            let ground = if i.is_multiple_of(2) { 1.0 } else { 0.999 };
             if self == Self::Disc && x * x + y * y <= 1.0 { 1000.0 } else { ground }
         };
         (0..TEXELS * TEXELS).map(value).collect()

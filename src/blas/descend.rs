@@ -31,9 +31,9 @@ impl<const M: usize> Parts<'_, M> {
         if self.node == LEAF {
             return centers;
         }
-        for i in 0..M {
+        for (i, average) in self.averages.iter().enumerate() {
             let below = node::below(self.blocks, self.node, i);
-            if below == LEAF || self.averages[i] == 0.0 {
+            if below == LEAF || *average == 0.0 {
                 continue;
             }
             let averages = node::averages(self.blocks, below);

@@ -176,7 +176,7 @@ impl Growing<'_> {
 
 /// Maps all items, in parallel with the feature `rayon`. Each one is mapped alone, and the order stays: the result does
 /// not depend on the number of threads.
-fn map<T: Sync, R: Send>(items: &[T], map: impl Fn(&T) -> R + Sync) -> Vec<R> {
+fn map<T: Sync, R: Send>(items: &[T], map: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     #[cfg(feature = "rayon")]
     if items.len() >= PARALLEL {
         use rayon::prelude::*;

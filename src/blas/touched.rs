@@ -48,7 +48,7 @@ pub(crate) fn range(prepared: &Prepared<'_>, footprint: &Footprint, exact: bool)
     };
     let (columns, rows) = (along(0), along(1));
     let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
-    let finest = (0..prepared.top()).take_while(|level| span > f64::from(2 * BLOCKS << level)).count() as u32;
+    let finest = (0..prepared.top()).take_while(|level| span > f64::from((2 * BLOCKS) << level)).count() as u32;
     let range = Range { min: f32::INFINITY, max: 0.0 };
     let mut search = Search { prepared, footprint, reach, exact, finest, range };
     for row in &rows {
