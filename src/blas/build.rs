@@ -25,7 +25,7 @@ const FINE_LENGTH: f64 = 1.5;
 /// where look-up blurs them.
 const EXTRA_HALVINGS: [u32; 2] = [6, 2];
 
-/// Memory for each texel that a triangle covers. Copies of one texel count once.
+/// Memory for each texel that a triangle covers. Where it covers copies of them, each texel counts for a quarter.
 const BYTES_PER_TEXEL: f64 = 2.0;
 
 /// Memory for edges between the few large texels of a small image. All its triangles share it: the first ones take what
@@ -49,7 +49,7 @@ const LEAVES_PER_COPY: f64 = 4.0;
 /// A cell is divided until look-ups in it are all the same, or until it has at most one texel's area and edges of at
 /// most 1.5 texels; beyond that, up to six times (twice with bilinear look-up), where an edge of the image runs through. A triangle whose memory
 /// runs out divides the cells first that are worth most; the others keep their average. There are two bytes for each
-/// texel that it can see, where copies of one texel count once beyond 2^15, more for images of less than 2^17 texels,
+/// texel that it can see, half a byte (for 2^15 texels at least) where it sees copies of them, more for images of less than 2^17 texels,
 /// and 4 MB in all. If that leaves fewer than four leaves for each copy of the image, the triangle is not divided.
 ///
 /// # Errors
@@ -83,7 +83,7 @@ pub(crate) fn build<const M: usize>(
     let deepest = (fine + extra / level_halvings::<M>()).min(MAX_DEPTH / level_halvings::<M>());
     debug_assert!(LATTICE >> (deepest * level_halvings::<M>()) >= 16);
     let tree = grow::<M>(prepared, &chart, range, &Limits { nodes, fine, deepest });
-    if tree.divided.is_empty() {
+    if tree.divided.is_empty() || tree.average == 0.0 {
         return Ok(Root::constant(tree.average));
     }
     let count = end(pool, tree.divided.len() / M);
@@ -124,7 +124,8 @@ impl Memory {
         let size = prepared.texture().size().map(f64::from);
         let covered = chart.covered();
         let seen = w.min(size[0]) * h.min(size[1]);
-        let own = (BYTES_PER_TEXEL * covered.min(seen.max(TEXELS_OF_COPIES))).min(MAX_BYTES);
+        let own = if covered <= seen { covered } else { covered.min((0.25 * seen).max(TEXELS_OF_COPIES)) };
+        let own = (BYTES_PER_TEXEL * own).min(MAX_BYTES);
         let share = (covered / (size[0] * size[1])).min(1.0);
         Self { own, most: own.max((BYTES_PER_IMAGE * share).min(own + prepared.extra)) }
     }
