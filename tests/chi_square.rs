@@ -65,7 +65,12 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     let mut expected = Vec::with_capacity(observed.len());
     for triangle in scene.triangles() {
         let on = OnTriangle::new(&scene, triangle, &x, &pdf);
-        let least_depth = if lights.pmf(&x, id(triangle)) > 1e-4 { 4 } else { 2 };
+        // The more probable a triangle, the finer what may be missed in it.
+        let least_depth = match lights.pmf(&x, id(triangle)) {
+            pmf if pmf > 0.05 => 6,
+            pmf if pmf > 1e-4 => 4,
+            _ => 2,
+        };
         let (integrals, _) = on.integrate(DEPTH, least_depth, &probes[triangle.0][triangle.1]);
         expected.extend(integrals.iter().map(|share| share * SAMPLES as f64));
     }
