@@ -2,7 +2,6 @@ use glam::Vec2;
 
 use super::*;
 use crate::blas::barycentric::{Lattice, child, interior_point};
-use crate::blas::code::LARGEST;
 use crate::blas::node::{averages, below, mean};
 use crate::blas::validate::{validate, validate_roots};
 use crate::record::Filter;
