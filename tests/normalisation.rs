@@ -32,7 +32,12 @@ struct Found {
 /// less than the integration resolves.
 fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[LightSample], wrong: bool) -> (f64, f64) {
     let count = scene.triangles().count();
-    let least_depth = if count < 1000 { 4 } else { 2 };
+    // The more probable a triangle, the finer what may be missed in it.
+    let least_depth = |pmf: f64| match pmf {
+        _ if count >= 1000 => 2,
+        pmf if pmf > 0.05 => 6,
+        _ => 4,
+    };
     let probes = probes(scene, samples);
     let pdf = |hit: &Hit| {
         let factor = if wrong && hit.barycentrics[0] > 0.5 { 1.1 } else { 1.0 };
@@ -49,7 +54,7 @@ fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[Lig
         }
         left -= pmf;
         let on = OnTriangle::new(scene, triangle, x, &pdf);
-        let (whole, open) = on.integrate(0, least_depth, &probes[triangle.0][triangle.1]);
+        let (whole, open) = on.integrate(0, least_depth(pmf), &probes[triangle.0][triangle.1]);
         sum += whole[0];
         unresolved += open;
     }

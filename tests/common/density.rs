@@ -13,6 +13,9 @@ pub(crate) fn id((mesh, triangle): (usize, usize)) -> TriangleId {
     TriangleId { mesh: mesh as u32, triangle: triangle as u32 }
 }
 
+/// From here on cells are so small that four equal values settle them.
+const DEEPEST_DOUBT: u32 = 8;
+
 /// One triangle from one shading point.
 pub(crate) struct OnTriangle<'a> {
     id: TriangleId,
@@ -46,8 +49,9 @@ impl<'a> OnTriangle<'a> {
     }
 
     /// Integrals over the cells of a depth, in the order of [`bin`]. Cells are divided as long as the density differs
-    /// inside of them: between the middles of their quarters, of the quarters of these, or at one of the `probes`. Probes only tell where to
-    /// look closer; samples do well. Second, the most that cells which were too small to divide can be wrong by.
+    /// inside of them: between the middles of their quarters, of the quarters of these, or at one of the `probes`.
+    /// Probes only tell where to look closer; samples do well. Second, the most that cells which were too small to
+    /// divide can be wrong by.
     pub(crate) fn integrate(&self, bin_depth: u32, least_depth: u32, probes: &[[f32; 2]]) -> (Vec<f64>, f64) {
         let mut bins = vec![0.0; 1 << (2 * bin_depth)];
         let probes = probes.iter().map(|b| (b.map(f64::from), self.density(b.map(f64::from)))).collect();
@@ -75,7 +79,7 @@ impl Walk<'_, '_> {
             let values = quarters.map(|q| self.on.density(middle(q)));
             // Averages are rounded, so that four can be the same by chance: then their quarters must be, too.
             let mut parts = Vec::new();
-            if depth < DEEPEST && values.iter().all(|v| (v - values[0]).abs() <= 1e-4 * v) {
+            if depth < DEEPEST_DOUBT && values.iter().all(|v| (v - values[0]).abs() <= 1e-4 * v) {
                 let of_quarter = |q| (0..4).map(move |i| middle(quarter(q, i)));
                 parts.extend(quarters.into_iter().flat_map(of_quarter).map(|b| self.on.density(b)));
             }
