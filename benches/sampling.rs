@@ -1,11 +1,11 @@
-//! Times of building and sampling, one thread.
+//! Times of sampling, one thread.
 //!
 //! `cloud-N` is `N` small triangles at random in the unit cube, each a mesh with a radiance of its own; the shading
 //! points lie in and around the cube. The map between sphere and square is part of `environment/radiance`.
 
 use core::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion};
+use criterion::{BenchmarkId, Criterion, Throughput};
 use fanlight::{Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight};
 use glam::{DVec3, Vec3};
 
@@ -108,6 +108,20 @@ fn lights(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group(format!("cloud-{n}"));
         group.bench_function("sample", |b| in_circle(b, POINTS, |i| sampler.sample(&points[i], numbers[i])));
 
+        let queries: Vec<_> = points.iter().copied().zip(numbers.iter().copied()).collect();
+        for size in [1, 2, 4, 8, 16] {
+            let mut samples = [None; 16];
+            let mut batches = queries.chunks_exact(size).cycle();
+            group.throughput(Throughput::Elements(size as u64));
+            group.bench_function(BenchmarkId::new("sample_many", size), |b| {
+                b.iter(|| {
+                    sampler.sample_many(batches.next().unwrap_or_default(), &mut samples);
+                    samples
+                });
+            });
+        }
+        group.throughput(Throughput::Elements(1));
+
         // Densities of what was drawn: elsewhere they would be cheap zeros.
         let drawn: Vec<(ShadingPoint, Hit, Vec3)> = points
             .iter()
@@ -121,11 +135,6 @@ fn lights(criterion: &mut Criterion) {
         group.bench_function("pdf_direction", |b| {
             in_circle(b, drawn.len(), |i| sampler.pdf_direction(&drawn[i].0, drawn[i].2));
         });
-        group.finish();
-
-        let mut group = criterion.benchmark_group("build");
-        group.sample_size(10);
-        group.bench_with_input(BenchmarkId::new("cloud", n), &cloud, |b, cloud| b.iter(|| build(cloud)));
         group.finish();
     }
 }

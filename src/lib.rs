@@ -38,6 +38,7 @@
 //!    build. Everything is checked here: what a builder accepted can always be sampled.
 //! 2. At a [`ShadingPoint`], call [`sample`](LightSampler::sample) with three random numbers and trace a ray. `None`
 //!    is a sample of zero.
+//!    With more than one question about a point, ask [`at`](LightSampler::at) it first.
 //! 3. Divide by the density that belongs to what was evaluated:
 //!
 //! | what the ray brings back | density |
@@ -75,7 +76,8 @@
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
 //! - punctual lights: points, spots and directions without an extent.
-//! - updates of a built sampler, except that the environment can be turned.
+//! - updates of a built sampler, except that the environment can be turned, and that lights can move and change their
+//!   brightness ([`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
 //!
 //! # Units and measures
@@ -120,8 +122,10 @@ mod error;
 mod geometry;
 mod light;
 mod math;
+mod parallel;
 mod record;
 mod sampler;
+mod simd;
 #[cfg(test)]
 mod testing;
 mod tlas;
@@ -135,10 +139,12 @@ struct Readme;
 pub use blas::Texture;
 pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSample, EnvironmentView, Sun, SunTexel};
 pub use error::Error;
+/// The vectors of the interface.
+pub use glam;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
 pub use sampler::{
-    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, PointSampler, Sides,
-    TextureId, Weight,
+    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, PointSampler,
+    Sides, TextureId, Weight,
 };
 pub use tlas::Splitting;

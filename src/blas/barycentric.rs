@@ -108,7 +108,7 @@ pub(crate) struct Place {
 
 /// The inverse of the numbering. `index` is below `M`.
 #[inline]
-pub(crate) fn place<const M: usize>(index: usize) -> Place {
+pub(crate) const fn place<const M: usize>(index: usize) -> Place {
     let r = edge_cells::<M>();
     debug_assert!(index < M);
     let index = index as u32;
@@ -116,7 +116,7 @@ pub(crate) fn place<const M: usize>(index: usize) -> Place {
     let column = index - row * row;
     let a2 = column / 2;
     let inverted = column % 2 == 1;
-    Place { a: [r - 1 - row, row - a2 - u32::from(inverted), a2], inverted }
+    Place { a: [r - 1 - row, row - a2 - column % 2, a2], inverted }
 }
 
 /// A cell of any depth: how its own coordinates map to those of the whole triangle.
@@ -166,6 +166,21 @@ impl Cell {
     pub(crate) fn corners(self) -> [Lattice; 3] {
         let s = self.size;
         [self.global([s, 0, 0]), self.global([0, s, 0]), self.global([0, 0, s])]
+    }
+
+    /// A point of the whole triangle in the cell's own coordinates, some of which are negative if it lies outside.
+    #[inline]
+    pub(crate) fn local(self, point: Lattice) -> [i32; 3] {
+        core::array::from_fn(|k| {
+            let step = point.0[k] as i32 - self.offset[k];
+            if self.inverted { -step } else { step }
+        })
+    }
+
+    /// Whether a point lies strictly inside of the cell.
+    #[inline]
+    pub(crate) fn holds(self, point: Lattice) -> bool {
+        self.local(point).iter().all(|&i| i > 0)
     }
 
     /// The corners as exact `[b1, b2]`.

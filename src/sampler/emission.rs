@@ -60,7 +60,7 @@ struct Everywhere;
 impl Shape for Everywhere {
     #[inline]
     fn worth(&self, _cell: &Cell) -> Worth {
-        Worth { weight: 1.0, uniform: true }
+        Worth { weight: 1.0, uniform: true, even: true }
     }
 }
 
@@ -226,6 +226,9 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
     /// A point of a triangle by the averages of its texture, as a guide leads.
     fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, Domain) -> Lattice) -> Option<Start> {
         let light = &self.lights.triangles[leaf as usize];
+        if self.lights.scale(light) == 0.0 {
+            return None;
+        }
         let triangle = light.triangle();
         let (normal, area) = triangle.normal_and_area()?;
         let (cell, pmf) = blas::descend(self.lights.cells, light.root, [Vec3::ZERO; 3], &Everywhere, guide)?;
@@ -243,10 +246,7 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
 
     fn ray(&self, leaf: u32, start: &Start, direction: Vec3, pdf: f64, pmf: f64) -> EmissionSample {
         EmissionSample {
-            hit: Hit {
-                triangle: self.lights.triangles[leaf as usize].id(),
-                barycentrics: start.place.to_barycentrics(),
-            },
+            hit: Hit { triangle: self.lights.id(leaf), barycentrics: start.place.to_barycentrics() },
             position: start.position.as_vec3(),
             normal: start.normal,
             direction,

@@ -1,14 +1,149 @@
 //! From the root to a leaf, and from a leaf back to the root: the same weights decide both.
 
-use super::importance::Scene;
-use super::node::{Child, TlasView};
+use super::importance::{Scene, Sight};
+use super::node::{Child, Node, TlasView};
 use crate::record::ShadingPoint;
-use crate::warp::{Variate, pick, pmf, sum};
+use crate::simd::{Level, Work, prefetch};
+use crate::warp::{Variate, pick_wide, pmf_wide};
+
+/// A way down the tree, as far as it has got.
+pub(crate) struct Walk<S> {
+    sight: Sight,
+    scene: S,
+    u: Variate,
+    node: u32,
+    /// Probability of getting here.
+    pmf: f64,
+    /// Where it ended: in a leaf, or with nothing.
+    end: Option<Option<u32>>,
+}
+
+impl<S: Scene> Walk<S> {
+    /// From the root.
+    #[inline(always)]
+    pub(crate) fn new(x: &ShadingPoint, scene: S, u: Variate) -> Self {
+        Self { sight: Sight::new(x), scene, u, node: 0, pmf: 1.0, end: None }
+    }
+
+    /// The leaf that was drawn, with its probability.
+    #[inline(always)]
+    pub(crate) fn leaf(&self) -> Option<(u32, f64)> {
+        self.end.flatten().map(|leaf| (leaf, self.pmf))
+    }
+
+    /// Goes on to a child, unless this is the end.
+    #[inline(always)]
+    fn step<const N: usize>(&mut self, tlas: &TlasView<'_, N>) {
+        let node = &tlas.nodes[self.node as usize];
+        let weights = node.weights(&self.sight, &self.scene);
+        let Some((lane, share)) = pick_wide(&weights, &mut self.u) else {
+            self.end = Some(None);
+            return;
+        };
+        self.pmf *= share;
+        match node.child(lane) {
+            Child::Node(index) => self.node = index,
+            Child::Leaf(leaf) => self.end = Some(Some(leaf)),
+            Child::Empty => self.end = Some(None),
+        }
+    }
+}
+
+/// One way down to a leaf.
+pub(super) struct Draw<'a, const N: usize, S> {
+    pub(super) tlas: &'a TlasView<'a, N>,
+    pub(super) walk: Walk<S>,
+}
+
+impl<const N: usize, S: Scene> Work for Draw<'_, N, S> {
+    type Output = Option<(u32, f64)>;
+
+    #[inline(always)]
+    fn run(mut self) -> Self::Output {
+        while self.walk.end.is_none() {
+            self.walk.step(self.tlas);
+        }
+        self.walk.leaf()
+    }
+}
+
+/// Several ways down, one step each in turn: while one waits for memory and for sums, the others go on.
+struct DrawMany<'a, const N: usize, S> {
+    tlas: &'a TlasView<'a, N>,
+    walks: &'a mut [Walk<S>],
+}
+
+impl<const N: usize, S: Scene> Work for DrawMany<'_, N, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let mut going = true;
+        while going {
+            going = false;
+            for walk in &mut *self.walks {
+                if walk.end.is_none() {
+                    walk.step(self.tlas);
+                    prefetch(&self.tlas.nodes[walk.node as usize]);
+                    going = true;
+                }
+            }
+        }
+    }
+}
+
+/// The way back from a leaf: the probability that [`Draw`] takes it.
+pub(super) struct Follow<'a, const N: usize, S> {
+    pub(super) tlas: &'a TlasView<'a, N>,
+    pub(super) leaf: u32,
+    pub(super) x: &'a ShadingPoint,
+    pub(super) scene: &'a S,
+}
+
+impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        // The way is short to find, but its nodes are far apart in memory.
+        self.tlas.path(self.leaf).for_each(|(node, _)| prefetch(&self.tlas.nodes[node]));
+        let sight = Sight::new(self.x);
+        let mut pmf = 1.0;
+        // Not a fold, whose closure would be compiled for the baseline.
+        for (node, lane) in self.tlas.path(self.leaf) {
+            pmf *= pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane);
+        }
+        pmf
+    }
+}
+
+/// The weights of one node.
+struct Weigh<'a, const N: usize, S> {
+    node: &'a Node<N>,
+    x: &'a ShadingPoint,
+    scene: &'a S,
+}
+
+impl<const N: usize, S: Scene> Work for Weigh<'_, N, S> {
+    type Output = [f32; N];
+
+    #[inline(always)]
+    fn run(self) -> [f32; N] {
+        self.node.weights(&Sight::new(self.x), self.scene)
+    }
+}
+
+impl<const N: usize> Node<N> {
+    /// Weight of every child.
+    pub(super) fn weigh(&self, x: &ShadingPoint, scene: &impl Scene) -> [f32; N] {
+        Level::best().run(Weigh { node: self, x, scene })
+    }
+}
 
 impl<const N: usize> TlasView<'_, N> {
     /// Draws a leaf. Returns it with its probability; `None` where nothing can arrive from the part of the tree
     /// that `u` leads to.
-    pub(crate) fn sample(&self, x: &ShadingPoint, scene: &impl Scene, u: &mut Variate) -> Option<(u32, f64)> {
+    pub(crate) fn sample(&self, x: &ShadingPoint, scene: &impl Scene, u: Variate) -> Option<(u32, f64)> {
         if self.nodes.is_empty() {
             return self.single_leaf(scene).then_some((0, 1.0));
         }
@@ -18,26 +153,24 @@ impl<const N: usize> TlasView<'_, N> {
     /// Draws a leaf below a node.
     pub(super) fn sample_below(
         &self,
-        mut node: usize,
+        node: usize,
         x: &ShadingPoint,
         scene: &impl Scene,
-        u: &mut Variate,
+        u: Variate,
     ) -> Option<(u32, f64)> {
-        let mut pmf = 1.0;
-        loop {
-            let weights = self.nodes[node].weights(x, scene);
-            let total = sum(&weights);
-            if total == 0.0 {
-                return None;
+        let walk = Walk { node: node as u32, ..Walk::new(x, scene, u) };
+        Level::best().run(Draw { tlas: self, walk })
+    }
+
+    /// As many calls of [`Self::sample`], of which each walk then holds what was drawn.
+    pub(crate) fn sample_many(&self, walks: &mut [Walk<impl Scene>]) {
+        if self.nodes.is_empty() {
+            for walk in walks {
+                walk.end = Some(self.single_leaf(&walk.scene).then_some(0));
             }
-            let lane = pick(&weights, total, u);
-            pmf *= f64::from(weights[lane]) / total;
-            match self.nodes[node].child(lane) {
-                Child::Node(index) => node = index as usize,
-                Child::Leaf(leaf) => return Some((leaf, pmf)),
-                Child::Empty => return None,
-            }
+            return;
         }
+        Level::best().run(DrawMany { tlas: self, walks });
     }
 
     /// Probability with which [`Self::sample`] draws a leaf.
@@ -45,13 +178,13 @@ impl<const N: usize> TlasView<'_, N> {
         if self.nodes.is_empty() {
             return if self.single_leaf(scene) { 1.0 } else { 0.0 };
         }
-        self.path(leaf).map(|(node, lane)| pmf(&self.nodes[node].weights(x, scene), lane)).product()
+        Level::best().run(Follow { tlas: self, leaf, x, scene })
     }
 
     /// Estimate of the irradiance from all leaves, in units of the sum of their energies. Zero for a tree without
     /// nodes.
     pub(crate) fn irradiance(&self, x: &ShadingPoint, scene: &impl Scene) -> f32 {
-        self.nodes.first().map_or(0.0, |root| root.weights(x, scene).iter().sum())
+        self.nodes.first().map_or(0.0, |root| root.weigh(x, scene).iter().sum())
     }
 
     /// Nodes and lanes on the way from a leaf to the root.
