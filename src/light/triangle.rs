@@ -12,6 +12,9 @@ use crate::record::{Receiver, ShadingPoint};
 /// Largest coordinate of a vertex: squares of squares of distances must not overflow where the tree is built.
 pub(crate) const POSITION_LIMIT: f32 = 1e9;
 
+/// Largest coordinate of a shading point that anything arrives at: squares of distances must not overflow.
+const FAR: f32 = 1e15;
+
 /// What is kept of every triangle that can send light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -106,7 +109,9 @@ impl<'a> Lit<'a> {
         illumination: Illumination,
         environment: Option<EnvironmentView<'a>>,
     ) -> Option<Self> {
-        if !light.is_visible(x) {
+        // NaN fails.
+        let is_near = x.position.to_array().iter().all(|x| x.abs() <= FAR);
+        if !is_near || !light.is_visible(x) {
             return None;
         }
         let triangle = light.triangle();

@@ -16,7 +16,7 @@ pub enum Receiver {
 /// A position, and how a direction is weighted there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadingPoint {
-    /// World position.
+    /// World position. Nothing arrives at one with a coordinate that is not finite, or above 1e15.
     pub position: Vec3,
     /// Weight of a direction at this point.
     pub receiver: Receiver,

@@ -153,13 +153,8 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
         blas::validate(self.cells)?;
         let roots: Vec<blas::Root> = self.triangles.iter().map(|triangle| triangle.root).collect();
         blas::validate_roots(&roots, self.cells)?;
-        self.triangles.iter().enumerate().try_for_each(|(i, triangle)| {
-            let valid = triangle.is_valid() && (triangle.place() as usize) < self.leaves.len();
-            if valid { Ok(()) } else { Err(Error::bytes("triangle", i, triangle.place(), self.leaves.len())) }
-        })?;
-        let leaf_count = self.triangles.len() as u32;
-        let bad_leaf = self.leaves.iter().position(|&leaf| leaf < NO_AREA && leaf >= leaf_count);
-        bad_leaf.map_or(Ok(()), |i| Err(Error::bytes("leaf of triangle", i, self.leaves[i], leaf_count)))?;
+        self.validate_places()?;
+        Error::unless_equal("start of the first mesh", self.meshes.first().map_or(0, |&start| start as usize), 0)?;
         let bad_mesh = self.meshes.windows(2).position(|pair| pair[0] > pair[1]);
         bad_mesh.map_or(Ok(()), |i| Err(Error::bytes("start of mesh", i, self.meshes[i], self.meshes[i + 1])))?;
         if !self.scales.is_empty() {
@@ -172,6 +167,23 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             self.meshes.last().map_or(usize::MAX, |&end| end as usize),
             self.leaves.len(),
         )
+    }
+
+    /// Whether leaves and triangles refer to each other, so that a sample is asked for its density under the number
+    /// that it came with.
+    fn validate_places(&self) -> Result<(), Error> {
+        for (i, triangle) in self.triangles.iter().enumerate() {
+            let leaf = self.leaves.get(triangle.place() as usize);
+            if !triangle.is_valid() || leaf.is_none_or(|&leaf| leaf as usize != i) {
+                return Err(Error::bytes("triangle", i, triangle.place(), self.leaves.len()));
+            }
+        }
+        for (place, &leaf) in self.leaves.iter().enumerate().filter(|(_, leaf)| **leaf < NO_AREA) {
+            if self.triangles.get(leaf as usize).is_none_or(|triangle| triangle.place() as usize != place) {
+                return Err(Error::bytes("leaf of triangle", place, leaf, self.triangles.len()));
+            }
+        }
+        Ok(())
     }
 }
 

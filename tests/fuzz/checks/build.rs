@@ -1,0 +1,131 @@
+//! Scenes from a fuzzer's bytes.
+
+use fanlight::{Environment, Filter, Illumination, LightSampler, Mesh, Sides, Texture, TextureId, Weight, Wrap};
+use glam::{Mat3, Vec2, Vec3};
+
+use super::reader::Reader;
+
+/// Lights of any kind, or `None` if the builder refuses them.
+pub(crate) fn lights(reader: &mut Reader<'_>) -> Option<LightSampler> {
+    let images: Vec<Image> = (0..reader.below(3)).map(|_| Image::read(reader)).collect();
+    let meshes: Vec<Soup> = (0..1 + reader.below(3)).map(|_| Soup::read(reader)).collect();
+    let mut builder = LightSampler::builder();
+    if let Some(environment) = environment(reader) {
+        builder.environment(environment);
+    }
+    let terms =
+        [Illumination::default(), Illumination::Conservative, Illumination::PointToPoint, Illumination::Boundary];
+    builder.illumination(terms[reader.below(terms.len())]);
+    let textures: Vec<TextureId> =
+        images.iter().filter_map(|image| Some(builder.add_texture(image.texture()?))).collect();
+    for soup in &meshes {
+        // A mesh that is refused leaves the builder as it was.
+        let _ = builder.add_mesh(&soup.mesh(&textures));
+    }
+    builder.build().ok()
+}
+
+/// Lights that are accepted, of several kinds.
+pub(crate) fn some_lights(kind: u8) -> LightSampler {
+    let texels = [0.0, 1.0, 0.5, 2.0];
+    let sky = [0.5, 1.0, 0.0, 100.0, 0.1, 0.2, 0.3, 0.4];
+    let positions: Vec<Vec3> = (0..12_u8).map(|i| Vec3::from([i % 3, i % 4, i % 5].map(f32::from))).collect();
+    let uvs: Vec<Vec2> = positions.iter().map(|p| Vec2::new(p.x, p.y)).collect();
+    let indices =
+        [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [0, 4, 8], [1, 5, 9], [2, 6, 10], [3, 7, 11], [0, 5, 11]];
+    let mut builder = LightSampler::builder();
+    if kind & 1 != 0 {
+        builder.environment(Environment::from_lat_long(4, 2, &sky, Filter::Nearest).expect("a valid sky"));
+    }
+    let texture = builder.add_texture(Texture::new(2, 2, &texels).expect("a valid texture"));
+    let weight = if kind & 2 != 0 { Weight::Texture(texture) } else { Weight::Constant(1.0) };
+    let count = if kind & 4 != 0 { indices.len() } else { 1 };
+    let indices = &indices[..count];
+    let mesh = if kind & 8 != 0 { Mesh::portal(&positions, indices) } else { Mesh::emitter(&positions, indices) };
+    builder.add_mesh(&mesh.uvs(&uvs).weight(weight).sides(Sides::Two)).expect("a valid mesh");
+    builder.build().expect("few triangles")
+}
+
+fn environment(reader: &mut Reader<'_>) -> Option<Environment> {
+    let filter = filter(reader);
+    let environment = match reader.below(4) {
+        0 => return None,
+        1 => Environment::constant(reader.float()),
+        2 => {
+            let (width, height) = (1 + reader.below(8), 1 + reader.below(8));
+            Environment::from_lat_long(width, height, &reader.floats(width * height), filter)
+        }
+        _ => {
+            let size = 1 << reader.below(4);
+            Environment::from_equal_area(size, &reader.floats(size * size), filter)
+        }
+    };
+    let axis = reader.vector().normalize_or(Vec3::X);
+    let environment = environment.ok()?;
+    environment.clone().with_rotation(Mat3::from_axis_angle(axis, reader.float())).ok().or(Some(environment))
+}
+
+fn filter(reader: &mut Reader<'_>) -> Filter {
+    [Filter::Nearest, Filter::Bilinear][reader.below(2)]
+}
+
+struct Image {
+    size: [usize; 2],
+    texels: Vec<f32>,
+    filter: Filter,
+    wrap: [Wrap; 2],
+}
+
+impl Image {
+    fn read(reader: &mut Reader<'_>) -> Self {
+        let size = [1 + reader.below(6), 1 + reader.below(6)];
+        let wrap = [(); 2].map(|()| [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp][reader.below(3)]);
+        Self { size, texels: reader.floats(size[0] * size[1]), filter: filter(reader), wrap }
+    }
+
+    fn texture(&self) -> Option<Texture<'_>> {
+        let texture = Texture::new(self.size[0], self.size[1], &self.texels).ok()?;
+        Some(texture.filter(self.filter).wrap(self.wrap[0], self.wrap[1]))
+    }
+}
+
+/// Triangles in any places.
+struct Soup {
+    positions: Vec<Vec3>,
+    indices: Vec<[u32; 3]>,
+    uvs: Vec<Vec2>,
+    /// A constant, or the number of an image.
+    weight: Result<f32, usize>,
+    sides: Sides,
+    portal: bool,
+}
+
+impl Soup {
+    fn read(reader: &mut Reader<'_>) -> Self {
+        let vertices = reader.below(10);
+        let positions = (0..vertices).map(|_| reader.vector()).collect();
+        // Now and then one too many.
+        let index = |reader: &mut Reader<'_>| {
+            let one_more = usize::from(reader.byte() == 0);
+            reader.below(vertices.max(1) + one_more) as u32
+        };
+        let indices = (0..reader.below(12)).map(|_| [(); 3].map(|()| index(reader))).collect();
+        let uvs = (0..vertices).map(|_| Vec2::new(reader.float(), reader.float())).collect();
+        let weight = if reader.byte() % 2 == 0 { Ok(reader.float()) } else { Err(reader.below(3)) };
+        let sides = if reader.byte() % 2 == 0 { Sides::One } else { Sides::Two };
+        Self { positions, indices, uvs, weight, sides, portal: reader.byte() % 2 == 0 }
+    }
+
+    fn mesh(&self, textures: &[TextureId]) -> Mesh<'_> {
+        let mesh = if self.portal {
+            Mesh::portal(&self.positions, &self.indices)
+        } else {
+            Mesh::emitter(&self.positions, &self.indices)
+        };
+        let weight = match self.weight {
+            Ok(constant) => Weight::Constant(constant),
+            Err(image) => textures.get(image).map_or(Weight::Constant(1.0), |texture| Weight::Texture(*texture)),
+        };
+        mesh.uvs(&self.uvs).weight(weight).sides(self.sides)
+    }
+}

@@ -1,0 +1,133 @@
+//! What must hold for any bytes at all. The fuzz targets call it with theirs, the tests with those that once failed.
+
+mod build;
+mod reader;
+
+use fanlight::{LightSample, LightSampler, LightSamplerView, Receiver, ShadingPoint, Splitting};
+use glam::Vec3;
+use reader::Reader;
+use smallvec::SmallVec;
+
+/// Positions and normals that the contracts speak of.
+const POSITION_LIMIT: f32 = 1e9;
+/// Relative difference between two ways to the same density.
+const TOLERANCE: f32 = 1e-5;
+
+/// Builds a scene from the bytes, and samples it if it is accepted.
+pub(crate) fn scene(data: &[u8]) {
+    let mut reader = Reader::new(data);
+    let Some(lights) = build::lights(&mut reader) else { return };
+    let view = lights.as_view();
+    loop {
+        sample(&view, &mut reader);
+        emit(&lights, &mut reader);
+        if reader.is_empty() {
+            return;
+        }
+    }
+}
+
+/// Loads bytes: those of a sampler with some of them changed, or, if the first one says so, the given ones as they are.
+pub(crate) fn bytes(data: &[u8]) {
+    let mut reader = Reader::new(data);
+    let mut bytes;
+    if reader.byte() % 4 == 0 {
+        bytes = data[1.min(data.len())..].to_vec();
+    } else {
+        bytes = build::some_lights(reader.byte()).to_bytes();
+        for _ in 0..reader.below(8) {
+            let at = reader.bits() as usize % bytes.len();
+            bytes[at] = reader.byte();
+        }
+        if reader.byte() % 8 == 0 {
+            bytes.truncate(reader.bits() as usize % bytes.len());
+        }
+    }
+    // At an address that is a multiple of four.
+    let mut padded = vec![0; bytes.len() + 4];
+    let start = padded.as_ptr().align_offset(4);
+    let aligned = &mut padded[start..start + bytes.len()];
+    aligned.copy_from_slice(&bytes);
+    let Ok(view) = LightSamplerView::<8, 4>::from_bytes(aligned) else { return };
+    for _ in 0..4 {
+        sample(&view, &mut reader);
+    }
+}
+
+fn receiver(reader: &mut Reader<'_>) -> Receiver {
+    let any = reader.vector();
+    let normal = if reader.byte() < 250 { any.normalize_or(Vec3::Z) } else { any };
+    [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][reader.below(3)]
+}
+
+/// Draws from one point, and checks every density.
+fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
+    let x = ShadingPoint { position: reader.vector(), receiver: receiver(reader) };
+    let u = [(); 3].map(|()| reader.float());
+    let at = lights.at(&x);
+    let direction = reader.vector();
+    assert_density(lights.pdf_direction(&x, direction));
+    if let Some(sample) = lights.sample(&x, u) {
+        check(lights, &x, &sample);
+        assert_eq!(at.sample(u), Some(sample));
+    }
+    let mut samples = SmallVec::<[LightSample; 8]>::new();
+    let splitting = Splitting { threshold: reader.float(), levels: reader.below(3) as u32 };
+    lights.sample_split(&x, u, &splitting, &mut samples);
+    for sample in &samples {
+        check_numbers(sample);
+        if is_ordinary(&x) {
+            assert_close(lights.pdf_split(&x, &sample.hit, &splitting), sample.pdf, sample);
+        }
+    }
+}
+
+fn check(lights: &LightSamplerView<'_>, x: &ShadingPoint, sample: &LightSample) {
+    check_numbers(sample);
+    if is_ordinary(x) {
+        assert_close(lights.pdf(x, &sample.hit), sample.pdf, sample);
+        let along = lights.pdf_sample_direction(x, sample);
+        assert!(along.is_finite() && along >= sample.pdf * (1.0 - TOLERANCE), "{along} along {sample:?}");
+    }
+}
+
+fn is_ordinary(x: &ShadingPoint) -> bool {
+    x.position.abs().max_element() <= POSITION_LIMIT
+        && match x.receiver {
+            Receiver::Surface(normal) | Receiver::Transmissive(normal) => (normal.length() - 1.0).abs() < 1e-5,
+            Receiver::Volume => true,
+        }
+}
+
+fn check_numbers(sample: &LightSample) {
+    let LightSample { position, normal, direction, distance, pdf, pdf_area, pmf, .. } = *sample;
+    assert!(position.is_finite() && normal.is_finite() && direction.is_finite(), "{sample:?}");
+    assert!((direction.length() - 1.0).abs() < 1e-4, "{sample:?}");
+    assert!(distance >= 0.0 && distance.is_finite(), "{sample:?}");
+    assert!(pdf > 0.0 && pdf_area > 0.0 && pmf > 0.0, "{sample:?}");
+    assert!(pdf.is_finite() && pdf_area.is_finite() && pmf.is_finite(), "{sample:?}");
+}
+
+fn assert_density(pdf: f32) {
+    assert!(pdf >= 0.0 && pdf.is_finite(), "{pdf}");
+}
+
+fn assert_close(found: f32, expected: f32, context: &impl core::fmt::Debug) {
+    assert!((found / expected - 1.0).abs() <= TOLERANCE, "{found} instead of {expected}: {context:?}");
+}
+
+/// Draws a ray of light, and checks its density.
+fn emit(lights: &LightSampler, reader: &mut Reader<'_>) {
+    let emission = lights.emission();
+    let u = [(); 5].map(|()| reader.float());
+    if let Some(ray) = emission.sample(u) {
+        assert!(ray.position.is_finite() && (ray.direction.length() - 1.0).abs() < 1e-4, "{ray:?}");
+        assert!(ray.pdf > 0.0 && ray.pdf.is_finite() && ray.pmf > 0.0, "{ray:?}");
+        assert_close(emission.pdf(&ray.hit, ray.direction), ray.pdf, &ray);
+    }
+    assert_density(emission.pdf_ray(reader.vector(), reader.vector()));
+    let direction = reader.vector().normalize_or(Vec3::X);
+    if let Some(ray) = emission.sample_distant(direction, [u[0], u[1], u[2]]) {
+        assert_close(emission.pdf_distant(direction, &ray.hit), ray.pdf, &ray);
+    }
+}

@@ -1,0 +1,8 @@
+//! Builders with any input, and sampling of whatever they accept.
+#![no_main]
+
+#[path = "../checks/mod.rs"]
+#[expect(dead_code, reason = "the other targets use the rest")]
+mod checks;
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| checks::scene(data));
