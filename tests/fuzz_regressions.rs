@@ -3,7 +3,7 @@
 #[path = "fuzz/checks/mod.rs"]
 mod checks;
 
-use fanlight::{LightSampler, LightSamplerView, Mesh, Receiver, ShadingPoint, Sides};
+use fanlight::{Environment, Filter, LightSampler, LightSamplerView, Mesh, Receiver, ShadingPoint, Sides};
 use glam::Vec3;
 use rand_pcg::{Pcg32, rand_core::Rng};
 
@@ -88,4 +88,19 @@ fn triangles_and_their_leaves_agree() {
     let mut absent = words;
     absent[starts + 3] = u32::MAX;
     assert!(load(&absent).expect_err("a leaf that its triangle does not know").to_string().contains("triangle"));
+}
+
+/// A sky whose only light comes from behind a portal.
+#[test]
+fn no_ray_leaves_where_nothing_is_sent() {
+    let mut builder = LightSampler::builder();
+    let texels: Vec<f32> = (0..64).map(|i| if [27, 28, 35, 36].contains(&i) { 1.0 } else { 0.0 }).collect();
+    let sky = Environment::from_equal_area(8, &texels, Filter::Nearest).expect("a valid sky");
+    builder.environment(sky);
+    builder.add_mesh(&Mesh::portal(&[Vec3::ZERO, Vec3::X, Vec3::Y], &[[0, 1, 2]])).expect("a valid mesh");
+    let lights = builder.build().expect("one triangle");
+    let emission = lights.emission();
+    for u in [0.0, 0.3, 0.6, 0.9] {
+        assert_eq!(emission.sample([u; 5]), None);
+    }
 }

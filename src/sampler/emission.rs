@@ -115,6 +115,9 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
     ///
     /// `None` where the drawn direction meets no side of a light that sends; such a `u` counts as a ray without power.
     pub fn sample(&self, u: [f32; 5]) -> Option<EmissionSample> {
+        if self.shares == [0.0; 2] {
+            return None;
+        }
         let [mut choice, b1, b2, d1, d2] = variates(u);
         match pick_pair(self.shares.map(|share| share as f32), &mut choice) {
             0 => self.sample_diffuse(choice, [b1, b2], [d1, d2]),
