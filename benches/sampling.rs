@@ -1,11 +1,11 @@
-//! Times of building and sampling, one thread.
+//! Times of sampling, one thread.
 //!
 //! `cloud-N` is `N` small triangles at random in the unit cube, each a mesh with a radiance of its own; the shading
 //! points lie in and around the cube. The map between sphere and square is part of `environment/radiance`.
 
 use core::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion};
+use criterion::Criterion;
 use fanlight::{Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight};
 use glam::{DVec3, Vec3};
 
@@ -121,11 +121,6 @@ fn lights(criterion: &mut Criterion) {
         group.bench_function("pdf_direction", |b| {
             in_circle(b, drawn.len(), |i| sampler.pdf_direction(&drawn[i].0, drawn[i].2));
         });
-        group.finish();
-
-        let mut group = criterion.benchmark_group("build");
-        group.sample_size(10);
-        group.bench_with_input(BenchmarkId::new("cloud", n), &cloud, |b, cloud| b.iter(|| build(cloud)));
         group.finish();
     }
 }

@@ -10,6 +10,12 @@ use core::fmt;
 pub struct Error(pub(crate) Kind);
 
 impl Error {
+    /// Whether it is no mistake but the host's own wish, given by what it passed to
+    /// [`build_with`](crate::LightSamplerBuilder::build_with).
+    pub fn is_cancelled(&self) -> bool {
+        self.0 == Kind::Cancelled
+    }
+
     /// Bytes that hold, in the element `at` or at that offset, something else than they should.
     pub(crate) fn bytes(what: &'static str, at: usize, found: impl TryInto<u64>, expected: impl TryInto<u64>) -> Self {
         let (found, expected) = (found.try_into().unwrap_or(u64::MAX), expected.try_into().unwrap_or(u64::MAX));
@@ -49,8 +55,16 @@ pub(crate) enum Kind {
     Weight { mesh: usize, value: f32, limit: f32 },
     /// A handle to a texture that this builder did not give out.
     UnknownTexture { mesh: usize, texture: usize, textures: usize },
+    /// A mesh that a sampler does not hold.
+    UnknownMesh { mesh: usize, meshes: usize },
+    /// A changed mesh of other triangles than before.
+    TriangleCount { mesh: usize, found: usize, expected: usize },
+    /// A triangle that is not in the tree, for it had no area, but would have to be.
+    Revived { mesh: usize, triangle: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
+    /// A build that the host has cancelled.
+    Cancelled,
     /// Bytes that do not hold what they should.
     Bytes { what: &'static str, at: usize, found: u64, expected: u64 },
 }
@@ -92,7 +106,15 @@ impl fmt::Display for Error {
             Kind::UnknownTexture { mesh, texture, textures } => {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")
             }
+            Kind::UnknownMesh { mesh, meshes } => write!(f, "mesh {mesh} was never added, this sampler has {meshes}"),
+            Kind::TriangleCount { mesh, found, expected } => {
+                write!(f, "mesh {mesh}: {found} triangles given, but it was added with {expected}")
+            }
+            Kind::Revived { mesh, triangle } => {
+                write!(f, "mesh {mesh}: triangle {triangle} has an area now, but had none when the sampler was built")
+            }
             Kind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
+            Kind::Cancelled => write!(f, "the build was cancelled"),
             Kind::Bytes { what, at, found, expected } => {
                 write!(f, "bytes: {what} at {at} is {found:#x}, expected {expected:#x}")
             }

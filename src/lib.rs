@@ -50,6 +50,9 @@
 //! The first and the third go together in multiple importance sampling, and so do the second and the fourth. A
 //! portal does not end a ray: where a second portal may lie on the way, use the first and the third.
 //!
+//! Several calls at one point share work through [`LightSampler::at`]. Photons start with [`LightSampler::emission`];
+//! those of a point light are drawn with [`sample`](LightSampler::sample) from a [`ShadingPoint::volume`] at its place.
+//!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them
 //! with BSDF samples, or with [`Environment::sample`].
 //!
@@ -72,7 +75,8 @@
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
 //! - punctual lights: points, spots and directions without an extent.
-//! - updates of a built sampler, except that the environment can be turned.
+//! - updates of a built sampler, except that the environment can be turned, and that lights can move and change their
+//!   brightness ([`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
 //!
 //! # Units and measures
@@ -117,8 +121,10 @@ mod error;
 mod geometry;
 mod light;
 mod math;
+mod parallel;
 mod record;
 mod sampler;
+mod simd;
 #[cfg(test)]
 mod testing;
 mod tlas;
@@ -132,10 +138,12 @@ struct Readme;
 pub use blas::Texture;
 pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSample, EnvironmentView, Sun, SunTexel};
 pub use error::Error;
+/// The vectors of the interface.
+pub use glam;
 pub use light::Illumination;
 pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
 pub use sampler::{
-    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, PointSampler, Sides,
-    TextureId, Weight,
+    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, PointSampler,
+    Sides, TextureId, Weight,
 };
 pub use tlas::Splitting;

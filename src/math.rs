@@ -3,12 +3,15 @@
 #[cfg(not(any(feature = "std", feature = "libm")))]
 compile_error!("fanlight needs the feature `std` or the feature `libm` for its floating-point functions");
 
-/// Square root of a non-negative number.
+/// Square root of a non-negative number. Without `std` by the machine's own instruction where that can be had: `libm`
+/// has it behind a call, and loops over calls never become vectors.
 #[inline(always)]
 pub(crate) fn sqrt(x: f32) -> f32 {
     #[cfg(feature = "std")]
     return x.sqrt();
-    #[cfg(not(feature = "std"))]
+    #[cfg(all(not(feature = "std"), target_arch = "x86_64", target_feature = "sse2"))]
+    return crate::simd::sqrt(x);
+    #[cfg(not(any(feature = "std", all(target_arch = "x86_64", target_feature = "sse2"))))]
     return libm::sqrtf(x);
 }
 
@@ -75,6 +78,24 @@ pub(crate) fn floor64(x: f64) -> f64 {
     return x.floor();
     #[cfg(not(feature = "std"))]
     return libm::floor(x);
+}
+
+/// The larger of both, and `low` for NaN: a single instruction, unlike `f32::max`.
+#[inline(always)]
+pub(crate) fn at_least(x: f32, low: f32) -> f32 {
+    if x > low { x } else { low }
+}
+
+/// The smaller of both, and `high` for NaN: a single instruction, unlike `f32::min`.
+#[inline(always)]
+pub(crate) fn at_most(x: f32, high: f32) -> f32 {
+    if x < high { x } else { high }
+}
+
+/// `x` or zero, by its bits: what is written as a choice may become a branch.
+#[inline(always)]
+pub(crate) fn only_if(condition: bool, x: f32) -> f32 {
+    f32::from_bits(x.to_bits() & u32::from(condition).wrapping_neg())
 }
 
 /// `x` limited to `[0, high]`; NaN becomes 0, unlike with `clamp`.

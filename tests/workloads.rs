@@ -50,6 +50,17 @@ fn sphere() {
 }
 
 #[test]
+fn sphere_with_spots() {
+    let scene = scenes::scene("sphere-9-spots");
+    assert_eq!(scene.lights.len(), 972);
+    let image = scene.image.expect("the sphere is textured");
+    assert_eq!(image.size, 256);
+    // Eight discs of radius 0.02, by the number of their texels.
+    let bright = image.texels.iter().filter(|texel| **texel == 100.0).count() as f64 / 65_536.0;
+    assert_close(&[bright], &[8.0 * core::f64::consts::PI * 0.02 * 0.02], 0.1);
+}
+
+#[test]
 fn quad() {
     let expected = [0.121_285_4, 0.114_489_3, 0.007_956_743, 0.0, 0.051_845_7];
     assert_close(&irradiances(&scenes::scene("quad")), &expected, 1e-4);
@@ -69,7 +80,7 @@ fn window() {
 
 #[test]
 fn clip_maps_are_what_holes_are() {
-    for (holes, clip) in [("grid-1", "grid-1-clip"), ("grid-100", "grid-100-clip")] {
+    for (holes, clip) in [("grid-1", "grid-1@clip-map"), ("grid-100", "grid-100@clip-map")] {
         let (holes, clip) = (irradiances(&scenes::scene(holes)), irradiances(&scenes::scene(clip)));
         assert_close(&clip, &holes, 1e-5);
     }
@@ -103,7 +114,7 @@ fn shaded_points(scene: &Scene) -> (Vec<ShadingPoint>, Vec<f64>) {
 #[test]
 fn irradiance_through_openings() {
     // The grid is coarse where an opening is small or has a jagged edge.
-    let tolerances = [("window", 1e-4), ("star", 1e-2), ("star-nearest", 1e-2), ("grid-100", 1e-2), ("nested", 3e-2)];
+    let tolerances = [("window", 1e-4), ("star", 1e-2), ("star@nearest", 1e-2), ("grid-100", 1e-2), ("nested", 3e-2)];
     for (name, tolerance) in tolerances {
         let scene = scenes::scene(name);
         let (points, found) = shaded_points(&scene);

@@ -15,12 +15,69 @@ pub(crate) struct Effort {
     pub(crate) repeats: usize,
     /// Most probabilities of triangles to be asked of a method.
     pub(crate) choices: usize,
+    /// Points that a study looks at.
+    pub(crate) study_points: usize,
+    /// Independent repetitions in a study.
+    pub(crate) repetitions: usize,
+    /// Images of a curve of error against time; each takes twice as long as the one before.
+    pub(crate) images: u32,
+    /// Seconds that the last of them is rendered.
+    pub(crate) seconds: f64,
 }
 
 impl Effort {
-    const FULL: Self = Self { points: 1000, samples: 4096, calls: 1 << 16, repeats: 9, choices: 20_000_000 };
-    const QUICK: Self = Self { points: 100, samples: 256, calls: 1 << 11, repeats: 3, choices: 300_000 };
-    const SMOKE: Self = Self { points: 8, samples: 16, calls: 1 << 6, repeats: 1, choices: 30_000 };
+    const FULL: Self = Self {
+        points: 1000,
+        samples: 4096,
+        calls: 1 << 16,
+        repeats: 9,
+        choices: 20_000_000,
+        study_points: 100,
+        repetitions: 256,
+        images: 6,
+        seconds: 8.0,
+    };
+    const QUICK: Self = Self {
+        points: 200,
+        samples: 512,
+        calls: 1 << 12,
+        repeats: 3,
+        choices: 1_000_000,
+        study_points: 20,
+        repetitions: 64,
+        images: 4,
+        seconds: 0.5,
+    };
+    const SMOKE: Self = Self {
+        points: 8,
+        samples: 16,
+        calls: 1 << 6,
+        repeats: 1,
+        choices: 30_000,
+        study_points: 2,
+        repetitions: 4,
+        images: 1,
+        seconds: 0.01,
+    };
+}
+
+/// What can be run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// One row for each workload, method and class.
+    Table,
+    /// How the error falls with the number of samples.
+    Stratification,
+    /// Several samples by splitting against as many independent ones.
+    Splitting,
+    /// Glossy receivers.
+    Lobes,
+    /// Error against time of rendered images.
+    Room,
+}
+
+impl Part {
+    const ALL: [Self; 5] = [Self::Table, Self::Stratification, Self::Splitting, Self::Lobes, Self::Room];
 }
 
 /// What the user asks for.
@@ -29,6 +86,7 @@ pub(crate) struct Args {
     pub(crate) effort: Effort,
     /// Not the full effort: skip methods that are slow to build.
     pub(crate) quick: bool,
+    pub(crate) parts: Vec<Part>,
     pub(crate) json: Option<PathBuf>,
     pub(crate) plots: Option<PathBuf>,
     pub(crate) workloads: Vec<String>,
@@ -36,15 +94,17 @@ pub(crate) struct Args {
 }
 
 const USAGE: &str = "cargo bench --bench quality -- [--quick] [--json FILE] [--plots DIR] [--workload W]... \
-                     [--method M]... [--points N] [--samples N]";
+                     [--method M]... [--points N] [--samples N] \
+                     [--table] [--stratification] [--splitting] [--lobes] [--room] [--everything]";
 
 impl Args {
     /// Reads the command line; ignores what cargo adds.
     pub(crate) fn parse() -> Result<Self, String> {
-        // `cargo bench` says so; `cargo test` does not, and wants to see it run once.
+        // `cargo bench` says so; `cargo test` does not, and wants to see everything run once.
         let is_bench = std::env::args().any(|word| word == "--bench");
         let effort = if is_bench { Effort::FULL } else { Effort::SMOKE };
-        let mut args = Self { effort, quick: !is_bench, json: None, plots: None, workloads: vec![], methods: vec![] };
+        let (parts, json, plots, workloads, methods) = (vec![], None, None, vec![], vec![]);
+        let mut args = Self { effort, quick: !is_bench, parts, json, plots, workloads, methods };
         let mut words = std::env::args().skip(1);
         while let Some(word) = words.next() {
             let mut value = || words.next().ok_or_else(|| format!("{word} needs a value\n{USAGE}"));
@@ -58,8 +118,17 @@ impl Args {
                 "--method" => args.methods.push(value()?),
                 "--points" => args.effort.points = number(&value()?)?,
                 "--samples" => args.effort.samples = number(&value()?)?,
+                "--table" => args.parts.push(Part::Table),
+                "--stratification" => args.parts.push(Part::Stratification),
+                "--splitting" => args.parts.push(Part::Splitting),
+                "--lobes" => args.parts.push(Part::Lobes),
+                "--room" => args.parts.push(Part::Room),
+                "--everything" => args.parts = Part::ALL.to_vec(),
                 _ => return Err(format!("unknown argument {word}\n{USAGE}")),
             }
+        }
+        if args.parts.is_empty() {
+            args.parts = if is_bench { vec![Part::Table] } else { Part::ALL.to_vec() };
         }
         Ok(args)
     }
@@ -69,14 +138,13 @@ impl Args {
         self.workloads.is_empty() || self.workloads.iter().any(|w| w == workload)
     }
 
-    /// The methods to run on a workload.
-    pub(crate) fn methods<'a>(&'a self, defaults: &'a [&'a str]) -> Vec<&'a str> {
-        let is_quick_enough = |method: &&str| !self.quick || *method != "tessellated";
-        if self.methods.is_empty() {
-            defaults.iter().copied().filter(is_quick_enough).collect()
-        } else {
-            defaults.iter().copied().filter(|method| self.methods.iter().any(|m| m == method)).collect()
-        }
+    /// Whether a method is asked for, by its name or by that of its variant.
+    pub(crate) fn wants_method(&self, method: &str, variant: Option<&str>) -> bool {
+        let is_same = |asked: &String| match (asked.split_once('@'), variant) {
+            (None, _) => asked == method,
+            (Some((name, of)), variant) => name == method && variant == Some(of),
+        };
+        self.methods.is_empty() || self.methods.iter().any(is_same)
     }
 }
 

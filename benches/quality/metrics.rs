@@ -26,6 +26,9 @@ pub(crate) struct Summary {
 
 /// Evaluates the choice of a triangle; `None` if the method makes none.
 pub(crate) fn select(method: &dyn Method, x: &ShadingPoint, truth: &Truth) -> Option<Selection> {
+    if truth.class == Class::Sun && method.draws_suns_apart() {
+        return None;
+    }
     let pmfs = method.pmfs(x, &|light| truth.by_light[light] > 0.0)?;
     let (mut second_moment, mut lost) = (0.0, 0.0);
     for (&irradiance, &pmf) in truth.by_light.iter().zip(&pmfs) {
@@ -40,7 +43,7 @@ pub(crate) fn select(method: &dyn Method, x: &ShadingPoint, truth: &Truth) -> Op
 }
 
 /// Relative variances, and the energies and variances behind them, in one.
-fn summary(variances: impl Iterator<Item = (f64, f64)>) -> Option<Summary> {
+pub(crate) fn summary(variances: impl Iterator<Item = (f64, f64)>) -> Option<Summary> {
     let (mut variance_sum, mut e2_sum) = (0.0, 0.0);
     let mut relative: Vec<f64> = variances
         .map(|(variance, e2)| {

@@ -176,7 +176,7 @@ fn locate(scene: &Scene, x: &ShadingPoint, direction: DVec3) -> Option<Drawn> {
 }
 
 /// Radiance from a direction times the cosine.
-fn contribution(scene: &Scene, x: &ShadingPoint, drawn: &Drawn) -> f64 {
+pub(crate) fn contribution(scene: &Scene, x: &ShadingPoint, drawn: &Drawn) -> f64 {
     let cosine = f64::from(x.cosine(drawn.direction));
     if cosine == 0.0 {
         return 0.0;

@@ -168,6 +168,21 @@ impl Cell {
         [self.global([s, 0, 0]), self.global([0, s, 0]), self.global([0, 0, s])]
     }
 
+    /// A point of the whole triangle in the cell's own coordinates, some of which are negative if it lies outside.
+    #[inline]
+    pub(crate) fn local(self, point: Lattice) -> [i32; 3] {
+        core::array::from_fn(|k| {
+            let step = point.0[k] as i32 - self.offset[k];
+            if self.inverted { -step } else { step }
+        })
+    }
+
+    /// Whether a point lies strictly inside of the cell.
+    #[inline]
+    pub(crate) fn holds(self, point: Lattice) -> bool {
+        self.local(point).iter().all(|&i| i > 0)
+    }
+
     /// The corners as exact `[b1, b2]`.
     #[cfg(test)]
     pub(crate) fn corner_barycentrics(self) -> [[f32; 2]; 3] {

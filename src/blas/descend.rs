@@ -42,6 +42,11 @@ impl Draw {
         Self { u }
     }
 
+    /// What is left of the variates.
+    pub(crate) fn rest(&self) -> [Variate; 2] {
+        self.u
+    }
+
     /// A point strictly inside of the chosen cell, drawn with what is left of the variates.
     pub(crate) fn point(&self, cell: barycentric::Cell) -> Lattice {
         cell.global(barycentric::interior_point(cell.size, self.u.map(|u| u.value())))
@@ -74,6 +79,11 @@ impl Follow {
     pub(crate) fn new(point: Lattice) -> Self {
         Self { local: point.0, size: barycentric::LATTICE }
     }
+
+    /// From a cell that holds the point.
+    pub(crate) fn below(cell: barycentric::Cell, point: Lattice) -> Self {
+        Self { local: cell.local(point).map(|i| i as u32), size: cell.size }
+    }
 }
 
 impl Guide for Follow {
@@ -86,19 +96,6 @@ impl Guide for Follow {
     }
 }
 
-/// Average of the texture over the smallest cell of the tree that holds a point.
-pub(crate) fn average<const M: usize>(nodes: &[Node<M>], root: Root, point: Lattice) -> f32 {
-    let Root { mut average, mut node } = root;
-    let (mut local, mut size) = (point.0, barycentric::LATTICE);
-    while node != LEAF {
-        let (index, below) = barycentric::child::<M>(local, size);
-        average = nodes[node as usize].average(index);
-        node = nodes[node as usize].below(index);
-        (local, size) = (below, size >> barycentric::level_halvings::<M>());
-    }
-    average
-}
-
 /// Descends from the whole triangle to a cell over which the density is constant. Returns it with its probability;
 /// `None` where nothing can arrive from the cell that the guide leads to.
 pub(crate) fn descend<const M: usize>(
@@ -108,8 +105,18 @@ pub(crate) fn descend<const M: usize>(
     shape: &impl Shape,
     guide: &mut impl Guide,
 ) -> Option<(Cell, f64)> {
-    let mut cell = Cell::root(vertices);
-    let mut node = root.node;
+    descend_below(nodes, root.node, Cell::root(vertices), shape, guide)
+}
+
+/// [`descend`] from a cell and the node below it.
+#[inline]
+pub(crate) fn descend_below<const M: usize>(
+    nodes: &[Node<M>],
+    mut node: u32,
+    mut cell: Cell,
+    shape: &impl Shape,
+    guide: &mut impl Guide,
+) -> Option<(Cell, f64)> {
     let mut uniform = false;
     if node == LEAF {
         let worth = shape.worth(&cell);

@@ -21,7 +21,7 @@ pub(crate) use barycentric::{Cell as Domain, Lattice};
 pub(crate) use build::build;
 pub(crate) use cell::Cell;
 pub(crate) use coverage::{MAX_AVERAGE, storable};
-pub(crate) use descend::{Draw, Follow, Guide, Shape, Worth, average, descend};
+pub(crate) use descend::{Draw, Follow, Guide, Shape, Worth, descend, descend_below};
 pub(crate) use footprint::check_uv;
 pub(crate) use node::{LEAF, Node, Root, validate, validate_roots};
 pub(crate) use pyramid::Prepared;

@@ -1,8 +1,7 @@
 //! Sampling a direction of the environment in proportion to its radiance, and the density of that.
 
-use super::pyramid::{children, level_start};
+use super::pyramid::children;
 use super::rotation::to_world;
-use super::suns::Sun;
 use super::view::EnvironmentView;
 use crate::warp::equal_area::{SPHERE, square_to_sphere};
 use crate::warp::pick_pair;
@@ -46,54 +45,15 @@ impl EnvironmentView<'_> {
     /// Draws a direction below a texel of a level in proportion to its radiance. Its density is that of
     /// [`sample`](Self::sample), not given the texel.
     #[inline]
-    pub(super) fn sample_below(&self, depth: u32, [mut x, mut y]: [u32; 2], u: &mut [Variate; 2]) -> EnvironmentSample {
-        for depth in depth..self.header.depth {
-            [x, y] = step(children(self.means, depth, x, y), [x, y], u);
+    pub(super) fn sample_below(&self, level: u32, [mut x, mut y]: [u32; 2], u: &mut [Variate; 2]) -> EnvironmentSample {
+        let depth = self.header.depth;
+        for level in level..depth {
+            [x, y] = step(children(self.means, level, x, y), [x, y], u);
         }
-        let point = Vec2::new(self.inside(x, u[0].value_f32()), self.inside(y, u[1].value_f32()));
+        let point = Vec2::new(inside(depth, x, u[0].value_f32()), inside(depth, y, u[1].value_f32()));
         let direction = to_world(&self.header.rotation, square_to_sphere(point));
-        let radiance = self.mean_at(self.header.depth, x, y);
+        let radiance = self.mean_at(depth, x, y);
         EnvironmentSample { direction, radiance, pdf: self.pdf_of(radiance) }
-    }
-
-    /// Draws a world direction in a sun, with a density in proportion to its excess over the cap.
-    pub(crate) fn sample_sun(&self, sun: usize, mut u: [Variate; 2]) -> Vec3 {
-        let [start, end] = self.suns[sun].range;
-        let texels = &self.sun_texels[start as usize..end as usize];
-        let target = u[1].value_f32();
-        let chosen = texels.partition_point(|texel| texel.sum <= target).min(texels.len() - 1);
-        let below = if chosen == 0 { 0.0 } else { f64::from(texels[chosen - 1].sum) };
-        let width = f64::from(texels[chosen].sum) - below;
-        u[1].stretch(u[1].value() - below, width, 1.0);
-        let (depth, texel) = (self.header.depth, texels[chosen].texel);
-        let (x, y) = (texel & ((1 << depth) - 1), texel >> depth);
-        let point = Vec2::new(self.inside(x, u[0].value_f32()), self.inside(y, u[1].value_f32()));
-        to_world(&self.header.rotation, square_to_sphere(point))
-    }
-
-    /// The sun that a world direction lies in, and the density per solid angle with which
-    /// [`sample_sun`](Self::sample_sun) draws it.
-    #[inline]
-    pub(crate) fn sun_at(&self, direction: Vec3) -> Option<(usize, f32)> {
-        if self.suns.is_empty() {
-            return None;
-        }
-        let texel = self.texel(direction);
-        let radiance = self.means[level_start(self.header.depth) + texel as usize];
-        if radiance <= self.header.cap {
-            return None;
-        }
-        let holds = |sun: &Sun| {
-            let texels = &self.sun_texels[sun.range[0] as usize..sun.range[1] as usize];
-            texels.binary_search_by_key(&texel, |texel| texel.texel).is_ok()
-        };
-        let sun = self.suns.iter().position(holds)?;
-        Some((sun, (radiance - self.header.cap) / self.suns[sun].power))
-    }
-
-    /// Axis of a sun in the world.
-    pub(crate) fn sun_axis(&self, sun: usize) -> Vec3 {
-        to_world(&self.header.rotation, Vec3::from_array(self.suns[sun].axis))
     }
 
     /// Density, per solid angle, with which [`sample`](Self::sample) draws a unit world direction.
@@ -110,14 +70,14 @@ impl EnvironmentView<'_> {
     fn pdf_of(&self, radiance: f32) -> f32 {
         radiance / (self.header.mean * SPHERE)
     }
+}
 
-    /// Coordinate in the square of a place in a texel, kept off the texel's edges.
-    #[inline]
-    fn inside(&self, texel: u32, place: f32) -> f32 {
-        let side = 1.0 / (1_u32 << self.header.depth) as f32;
-        let low = texel as f32 * side;
-        ((texel as f32 + place) * side).max(low + MARGIN).min(low + side - MARGIN)
-    }
+/// Coordinate in the square of a place in a texel of a level with `2^depth` texels a side, kept off its edges.
+#[inline]
+pub(super) fn inside(depth: u32, texel: u32, place: f32) -> f32 {
+    let side = 1.0 / (1_u32 << depth) as f32;
+    let low = texel as f32 * side;
+    ((texel as f32 + place) * side).max(low + MARGIN).min(low + side - MARGIN)
 }
 
 /// Chooses one of the four texels below a texel in proportion to their weights: the second variate the row, the

@@ -9,8 +9,10 @@ mod descend;
 mod directions;
 mod footprint;
 mod lat_long;
+mod opening;
 mod parts;
 mod polygon;
+mod polygon32;
 mod pyramid;
 mod resample;
 mod rotation;
@@ -18,15 +20,18 @@ mod source;
 mod suns;
 #[cfg(test)]
 mod tests;
+mod texel;
 mod view;
 
 pub use build::Environment;
 pub use descend::EnvironmentSample;
 pub(crate) use directions::Directions;
 pub(crate) use footprint::Footprint;
+pub(crate) use opening::{Cover, Opening};
 pub use parts::EnvironmentParts;
 pub(crate) use suns::MAX_SUNS;
-pub use suns::{Sun, SunTexel};
+pub use suns::Sun;
+pub use texel::SunTexel;
 pub use view::{EnvironmentHeader, EnvironmentView};
 
 /// Largest radiance of a texel. What is brighter is refused.

@@ -1,7 +1,8 @@
 //! Checking an environment that comes from elsewhere.
 
 use super::pyramid::{children, level_start, parent_mean, parent_range};
-use super::suns::{Sun, SunTexel, Suns, finest};
+use super::suns::{Sun, Suns, finest};
+use super::texel::SunTexel;
 use super::view::{EnvironmentHeader, EnvironmentView};
 use super::{BRIGHTEST, DARKEST, MAX_DEPTH, rotation};
 use crate::error::{Error, Kind};

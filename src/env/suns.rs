@@ -12,6 +12,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 use super::pyramid::level_start;
+use super::texel::SunTexel;
 use crate::warp::equal_area::{SPHERE, square_to_sphere, wrap_texel_log2};
 
 /// Most suns of an environment: each costs every sample a few rays against the portals.
@@ -26,6 +27,9 @@ const LEAST_SHARE: f64 = 0.01;
 /// Most texels in suns, as a share of the image.
 const MOST_TEXELS: usize = 256;
 
+/// Most texels of a sun, after merging: they bound what a shading point costs where a sun is seen in part.
+const MOST_BLOCKS: usize = 64;
+
 /// A cluster of bright texels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -38,16 +42,8 @@ pub struct Sun {
     pub power: f32,
     /// Where its texels start and end in the list of all.
     pub range: [u32; 2],
-}
-
-/// A texel of a sun.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct SunTexel {
-    /// Its number in the finest level, row by row.
-    pub texel: u32,
-    /// Share of the sun's power in this texel and those before it; 1 for the last one.
-    pub sum: f32,
+    /// Its texels are those of an image of `2^level` texels a side.
+    pub level: u32,
 }
 
 /// An image split into suns and a capped rest.
@@ -114,30 +110,49 @@ impl Suns {
         let excess = |texel: u32| f64::from(image[texel as usize]) - f64::from(self.cap);
         let total: f64 = group.iter().map(|&texel| excess(texel)).sum();
         let start = self.texels.len() as u32;
+        let (level, blocks) = blocks(depth, group.iter().map(|&texel| (texel, excess(texel))).collect());
+        let texels_a_block = f64::from(1_u32 << (2 * (depth - level)));
         let mut sum = 0.0;
-        let sums: Vec<SunTexel> = group
-            .iter()
-            .map(|&texel| {
-                sum += excess(texel);
-                SunTexel { texel, sum: (sum / total).min(1.0) as f32 }
-            })
-            .collect();
-        self.texels.extend(sums);
+        for (block, power) in blocks {
+            sum += power;
+            let texel = SunTexel::new(level, block, (power / texels_a_block) as f32);
+            self.texels.push(SunTexel { sum: (sum / total).min(1.0) as f32, ..texel });
+        }
         if let Some(last) = self.texels.last_mut() {
             last.sum = 1.0;
         }
         let axis = group.iter().map(|&t| center(depth, t) * excess(t) as f32).sum::<Vec3>().normalize_or(Vec3::Z);
         // A texel reaches at most its diagonal beyond its centre: √2 / 2^depth of the square, 3 radians of it.
-        let texel_radius = 3.0 * core::f32::consts::SQRT_2 / (1_u32 << depth) as f32;
+        let texel_radius = 3.0 * core::f32::consts::SQRT_2 / (1_u32 << level) as f32;
         let sin = group.iter().fold(0.0, |sin: f32, &t| sin.max(axis.cross(center(depth, t)).length()));
         let power = total * f64::from(SPHERE) / image.len() as f64;
         Sun {
             axis: axis.to_array(),
             sin_radius: sin + texel_radius,
             power: power as f32,
-            range: [start, start + group.len() as u32],
+            range: [start, self.texels.len() as u32],
+            level,
         }
     }
+}
+
+/// Merges four texels into one, over and over, until there are few enough. They stay sorted by number.
+fn blocks(depth: u32, mut texels: Vec<(u32, f64)>) -> (u32, Vec<(u32, f64)>) {
+    let mut level = depth;
+    while texels.len() > MOST_BLOCKS {
+        let parent = |texel: u32| ((texel >> (level + 1)) << (level - 1)) | ((texel & ((1 << level) - 1)) >> 1);
+        texels = texels.into_iter().map(|(texel, power)| (parent(texel), power)).collect();
+        texels.sort_by_key(|&(texel, _)| texel);
+        texels.dedup_by(|(texel, power), (kept, sum)| {
+            let same = texel == kept;
+            if same {
+                *sum += *power;
+            }
+            same
+        });
+        level -= 1;
+    }
+    (level, texels)
 }
 
 /// All bright texels that hang together with one of them, corners included.

@@ -2,10 +2,11 @@
 
 use super::pyramid::{Pyramid, level_start};
 use super::rotation::to_local;
-use super::suns::{Sun, SunTexel, Suns};
+use super::suns::{Sun, Suns};
+use super::texel::SunTexel;
 use crate::warp::equal_area::{SPHERE, sphere_to_square};
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 
 /// The fixed part of an environment, plain data.
 #[repr(C)]
@@ -124,14 +125,8 @@ impl<'a> EnvironmentView<'a> {
 
     /// Number of the texel of the finest level that a unit world direction falls into.
     #[inline]
-    pub(super) fn texel(&self, direction: Vec3) -> u32 {
-        let depth = self.header.depth;
-        let point = sphere_to_square(to_local(&self.header.rotation, direction));
-        let scale = (1_u32 << depth) as f32;
-        // The product is exact, and the cast truncates; the square's far edges belong to the last texel.
-        let last = (1 << depth) - 1;
-        let (x, y) = (((point.x * scale) as u32).min(last), ((point.y * scale) as u32).min(last));
-        (y << depth) | x
+    fn texel(&self, direction: Vec3) -> u32 {
+        texel_at(self.header.depth, sphere_to_square(to_local(&self.header.rotation, direction)))
     }
 
     /// 3x3 filtered mean of a texel of the level with `2^depth` texels a side, without the suns.
@@ -155,4 +150,13 @@ impl<'a> EnvironmentView<'a> {
             self.ranges[level_start(depth) + ((y << depth) | x) as usize]
         }
     }
+}
+
+/// Number of the texel that holds a point of the square, in the level with `2^depth` texels a side.
+#[inline]
+pub(super) fn texel_at(depth: u32, point: Vec2) -> u32 {
+    // The product is exact, and the cast truncates; the square's far edges belong to the last texel.
+    let (scale, last) = ((1_u32 << depth) as f32, (1 << depth) - 1);
+    let (x, y) = (((point.x * scale) as u32).min(last), ((point.y * scale) as u32).min(last));
+    (y << depth) | x
 }

@@ -33,9 +33,9 @@ impl Aabb {
         0.5 * self.min + 0.5 * self.max
     }
 
-    /// Surface area of the box made larger by `pad` along each axis, so that flat boxes still compare.
-    pub(crate) fn padded_area(&self, pad: f32) -> f32 {
-        let e = self.extent() + Vec3::splat(pad);
+    /// Surface area; zero for the empty box.
+    pub(crate) fn area(&self) -> f32 {
+        let e = self.extent();
         2.0 * (e.x * e.y + e.y * e.z + e.z * e.x)
     }
 }

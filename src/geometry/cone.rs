@@ -44,7 +44,7 @@ impl Cone {
 }
 
 /// Angle between unit vectors, accurate for small and for nearly straight ones as well.
-fn angle(a: Vec3, b: Vec3) -> f32 {
+pub(crate) fn angle(a: Vec3, b: Vec3) -> f32 {
     if a.dot(b) >= 0.0 {
         2.0 * math::asin(0.5 * math::sqrt((a - b).length_squared()))
     } else {

@@ -5,5 +5,5 @@ mod cone;
 mod triangle;
 
 pub(crate) use aabb::Aabb;
-pub(crate) use cone::Cone;
+pub(crate) use cone::{Cone, angle};
 pub(crate) use triangle::{Triangle, intersect};

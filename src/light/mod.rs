@@ -1,7 +1,9 @@
 //! Joins a triangle, its texture's tree and the environment into one target.
 
 mod illumination;
+mod sun;
 mod triangle;
 
 pub use illumination::Illumination;
+pub(crate) use sun::{Part, Sunlit};
 pub(crate) use triangle::{LightTriangle, Lit, POSITION_LIMIT};

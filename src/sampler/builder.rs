@@ -3,21 +3,17 @@
 use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::ControlFlow;
 
-use glam::Vec3;
-
-use super::lights::{LightSampler, NO_LEAF};
-use super::mesh::{Kind, Mesh, Sides, TextureId, Weight};
+use super::energy::Emission;
+use super::lights::{LightSampler, NO_AREA, NO_LEAF};
+use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
 use crate::blas::{self, Prepared, Root, Texture};
-use crate::bounds::{LightBounds, Moments};
 use crate::env::Environment;
 use crate::error::{Error, Kind as ErrorKind};
-use crate::geometry::{Aabb, Cone};
-use crate::light::{Illumination, LightTriangle, POSITION_LIMIT};
-use crate::tlas::{self, MAX_LEAVES};
-
-/// Least energy of a triangle relative to the sum of all. Below, it would vanish in single precision.
-const LEAST_ENERGY: f64 = 1e-30;
+use crate::light::{Illumination, LightTriangle};
+use crate::parallel;
+use crate::tlas::{self, MAX_LEAVES, Report};
 
 /// Collects the lights of a scene and builds a [`LightSampler`].
 ///
@@ -30,7 +26,7 @@ pub struct LightSamplerBuilder<'a, const N: usize = 8, const M: usize = 4> {
     textures: Vec<Prepared<'a>>,
     /// Triangles that may send light.
     triangles: Vec<LightTriangle>,
-    /// For every triangle that was added, its place in `triangles` or [`NO_LEAF`].
+    /// For every triangle that was added, its place in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
     places: Vec<u32>,
     /// Where each mesh starts in `places`, and the end.
     meshes: Vec<u32>,
@@ -109,28 +105,61 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     ///
     /// If there are more triangles than the tree can number (2^28 - 1).
     pub fn build(self) -> Result<LightSampler<N, M>, Error> {
+        self.build_reporting(None)
+    }
+
+    /// [`Self::build`] for hosts that show how far it is, or that want to be able to stop it. `report` is called now
+    /// and then with the share of the work that is done, in `[0, 1]`, and last with 1; [`ControlFlow::Break`] cancels
+    /// the build. With the feature `rayon` the calls come from the threads that build, several at once and not always
+    /// in order.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::build`], and one of which [`Error::is_cancelled`] is true if `report` has cancelled the build.
+    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler<N, M>, Error> {
+        self.build_reporting(Some(&report))
+    }
+
+    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N, M>, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
-        let (lights, bounds, energy) = select(&self.triangles, &environment);
-        if lights.len() > MAX_LEAVES {
-            return Err(Error(ErrorKind::TooMany { what: "light triangles", count: lights.len(), limit: MAX_LEAVES }));
+        let emission = Emission::new(&environment, &[]);
+        let sends = parallel::collect(self.triangles.len(), |i| emission.energy(&self.triangles[i]) > 0.0);
+        let sending: Vec<u32> = (0..).zip(sends).filter_map(|(i, sends)| sends.then_some(i)).collect();
+        if sending.len() > MAX_LEAVES {
+            return Err(Error(ErrorKind::TooMany { what: "light triangles", count: sending.len(), limit: MAX_LEAVES }));
         }
-        let (tlas, order) = tlas::build::<N>(&bounds);
+        let total = emission.total(&self.triangles);
+        let bounds = |light: u32| emission.bounds(&self.triangles[sending[light as usize] as usize], total).0;
+        let cancelled = |_| Error(ErrorKind::Cancelled);
+        let (tlas, order) = tlas::build::<N>(sending.len(), &bounds, report).map_err(cancelled)?;
+        let places = parallel::collect(order.len(), |leaf| sending[order[leaf] as usize]);
+        let triangles = parallel::collect(places.len(), |leaf| self.triangles[places[leaf] as usize]);
+        let portals = self.triangles.iter().any(LightTriangle::is_portal);
         let mut leaf_of = vec![NO_LEAF; self.triangles.len()];
-        for (leaf, &light) in (0..).zip(&order) {
-            leaf_of[lights[light as usize] as usize] = leaf;
+        for (leaf, &place) in (0..).zip(&places) {
+            leaf_of[place as usize] = leaf;
         }
-        let leaf_at = |&place: &u32| if place == NO_LEAF { NO_LEAF } else { leaf_of[place as usize] };
-        Ok(LightSampler {
+        let leaf_at = |&place: &u32| leaf_of.get(place as usize).copied().unwrap_or(place);
+        let mut lights = LightSampler {
             tlas,
-            triangles: order.iter().map(|&light| self.triangles[lights[light as usize] as usize]).collect(),
+            triangles,
             leaves: self.places.iter().map(leaf_at).collect(),
             meshes: self.meshes,
+            scales: Vec::new(),
             cells: self.cells,
-            energy,
-            portals: self.triangles.iter().any(LightTriangle::is_portal),
+            energy: 0.0,
+            portals,
             environment,
             illumination: self.illumination,
-        })
+            cost: 1.0,
+            cost_at_build: 1.0,
+        };
+        lights.fit();
+        lights.cost_at_build = lights.cost;
+        match report.map(|report| report(1.0)) {
+            Some(ControlFlow::Break(())) => Err(Error(ErrorKind::Cancelled)),
+            Some(ControlFlow::Continue(())) | None => Ok(lights),
+        }
     }
 
     fn check(&self, number: usize, mesh: &Mesh<'_>) -> Result<(), Error> {
@@ -140,16 +169,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         if count > MAX_LEAVES {
             return fail(ErrorKind::TooMany { what: "triangles", count, limit: MAX_LEAVES });
         }
-        let in_range = |p: &Vec3| p.to_array().iter().all(|x| x.abs() <= POSITION_LIMIT);
-        if let Some(vertex) = mesh.positions.iter().position(|p| !in_range(p)) {
-            let value = mesh.positions[vertex].to_array();
-            return fail(ErrorKind::Position { mesh: number, vertex, value, limit: POSITION_LIMIT });
-        }
-        for (triangle, indices) in mesh.indices.iter().enumerate() {
-            if let Some(&index) = indices.iter().find(|index| **index as usize >= vertices) {
-                return fail(ErrorKind::Index { mesh: number, triangle, index, vertices });
-            }
-        }
+        check_triangles(number, mesh.positions, mesh.indices)?;
         match mesh.weight {
             Weight::Constant(value) if !(0.0..=blas::MAX_AVERAGE).contains(&value) => {
                 fail(ErrorKind::Weight { mesh: number, value, limit: blas::MAX_AVERAGE })
@@ -177,9 +197,14 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
             root,
             flags: two_sided | portal,
         };
-        let sends = root.average > 0.0 && triangle.triangle().normal_and_area().is_some();
-        self.places.push(if sends { self.triangles.len() as u32 } else { NO_LEAF });
-        self.triangles.extend(sends.then_some(triangle));
+        if root.average == 0.0 {
+            self.places.push(NO_LEAF);
+        } else if triangle.triangle().normal_and_area().is_none() {
+            self.places.push(NO_AREA);
+        } else {
+            self.places.push(self.triangles.len() as u32);
+            self.triangles.push(triangle);
+        }
         Ok(())
     }
 
@@ -199,34 +224,4 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         self.shared.insert(key, root);
         Ok(root)
     }
-}
-
-/// Which triangles send anything in this environment, the bounds of each, and the energy of all.
-fn select(triangles: &[LightTriangle], environment: &Environment) -> (Vec<u32>, Vec<(LightBounds, Moments)>, f32) {
-    let mean = f64::from(environment.mean_without_suns());
-    let energy = |light: &LightTriangle| {
-        let radiance = if light.is_portal() { mean } else { 1.0 };
-        let area = light.triangle().normal_and_area().map_or(0.0, |(_, area)| f64::from(area));
-        f64::from(light.root.average) * area * radiance
-    };
-    let total: f64 = triangles.iter().map(energy).sum();
-    let lights: Vec<u32> = (0..).zip(triangles).filter(|(_, light)| energy(light) > 0.0).map(|(i, _)| i).collect();
-    let bounds = |&light: &u32| {
-        let light = &triangles[light as usize];
-        let share = (energy(light) / total).max(LEAST_ENERGY) as f32;
-        let directional = light.is_portal() && !environment.is_constant();
-        let triangle = light.triangle();
-        let normal = triangle.normal_and_area().map_or(Vec3::Z, |(normal, _)| normal);
-        let bounds = LightBounds {
-            aabb: Aabb::around(&triangle.0),
-            normals: Cone::single(normal),
-            flux: if directional { 0.0 } else { share },
-            portal: if directional { share } else { 0.0 },
-            two_sided: light.is_two_sided(),
-        };
-        let (mean, variance) = triangle.mean_and_variance();
-        (bounds, Moments { energy: share, mean, variance, normal })
-    };
-    let bounds = lights.iter().map(bounds).collect();
-    (lights, bounds, total.min(f64::from(f32::MAX)) as f32)
 }

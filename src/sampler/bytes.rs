@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
 
-use super::lights::{LightSampler, LightSamplerView, NO_LEAF};
+use super::lights::{LightSampler, LightSamplerView, NO_AREA};
 use crate::blas;
 use crate::env::{EnvironmentHeader, EnvironmentParts, EnvironmentView};
 use crate::error::Error;
@@ -16,10 +16,10 @@ use crate::tlas::TlasView;
 
 const MAGIC: [u8; 8] = *b"fanlight";
 /// Changes with every change of a layout.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Reads differently on a machine of the other byte order.
 const BYTE_ORDER: u32 = 0x0102_0304;
-const BUFFERS: usize = 13;
+const BUFFERS: usize = 14;
 /// Every buffer consists of 4-byte numbers.
 const ALIGNMENT: usize = 4;
 
@@ -79,6 +79,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             bytemuck::cast_slice(self.cells),
             bytemuck::cast_slice(self.meshes),
             bytemuck::cast_slice(self.leaves),
+            bytemuck::cast_slice(self.scales),
             bytemuck::cast_slice(environment.means),
             bytemuck::cast_slice(environment.ranges),
             bytemuck::cast_slice(environment.filtered_means),
@@ -108,6 +109,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             cells,
             meshes,
             places,
+            scales,
             means,
             ranges,
             filtered,
@@ -127,6 +129,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             cells: reader.slice("cells", cells)?,
             meshes: reader.slice("meshes", meshes)?,
             leaves: reader.slice("leaves of the triangles", places)?,
+            scales: reader.slice("scales of the meshes", scales)?,
             environment: EnvironmentView::from_parts(EnvironmentParts {
                 header: environment_header,
                 means: reader.slice("means", means)?,
@@ -154,10 +157,15 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             if triangle.is_valid() { Ok(()) } else { Err(Error::bytes("triangle", i, triangle.flags, 0u64)) }
         })?;
         let leaf_count = self.triangles.len() as u32;
-        let bad_leaf = self.leaves.iter().position(|&leaf| leaf != NO_LEAF && leaf >= leaf_count);
+        let bad_leaf = self.leaves.iter().position(|&leaf| leaf < NO_AREA && leaf >= leaf_count);
         bad_leaf.map_or(Ok(()), |i| Err(Error::bytes("leaf of triangle", i, self.leaves[i], leaf_count)))?;
         let bad_mesh = self.meshes.windows(2).position(|pair| pair[0] > pair[1]);
         bad_mesh.map_or(Ok(()), |i| Err(Error::bytes("start of mesh", i, self.meshes[i], self.meshes[i + 1])))?;
+        if !self.scales.is_empty() {
+            Error::unless_equal("number of scales", self.scales.len() + 1, self.meshes.len())?;
+        }
+        let bad_scale = self.scales.iter().position(|scale| !(0.0..=blas::MAX_AVERAGE).contains(scale));
+        bad_scale.map_or(Ok(()), |i| Err(Error::bytes("scale of mesh", i, self.scales[i].to_bits(), 0u64)))?;
         Error::unless_equal(
             "end of the meshes",
             self.meshes.last().map_or(usize::MAX, |&end| end as usize),

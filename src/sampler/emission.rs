@@ -226,6 +226,9 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
     /// A point of a triangle by the averages of its texture, as a guide leads.
     fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, Domain) -> Lattice) -> Option<Start> {
         let light = &self.lights.triangles[leaf as usize];
+        if self.lights.scale(light) == 0.0 {
+            return None;
+        }
         let triangle = light.triangle();
         let (normal, area) = triangle.normal_and_area()?;
         let (cell, pmf) = blas::descend(self.lights.cells, light.root, [Vec3::ZERO; 3], &Everywhere, guide)?;

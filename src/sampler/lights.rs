@@ -5,14 +5,17 @@ use alloc::vec::Vec;
 use glam::Vec3;
 
 use super::builder::LightSamplerBuilder;
+use super::energy::scale_of;
 use crate::blas;
 use crate::env::{Environment, EnvironmentView, Footprint};
 use crate::light::{Illumination, LightTriangle, Lit};
 use crate::record::{ShadingPoint, TriangleId};
 use crate::tlas::{self, Tlas, TlasView};
 
-/// Marks a triangle that is not in the tree because it sends nothing.
+/// Marks a triangle that is not in the tree because it sends nothing, whatever its shape.
 pub(super) const NO_LEAF: u32 = u32::MAX;
+/// Marks a triangle that is not in the tree because it has no area.
+pub(super) const NO_AREA: u32 = u32::MAX - 1;
 
 /// All lights of a scene, ready to be sampled. `N` is the arity of the tree over triangles (4, 8 or 16), `M` that of
 /// the trees over textures (4, 16 or 64).
@@ -27,14 +30,20 @@ pub struct LightSampler<const N: usize = 8, const M: usize = 4> {
     pub(super) cells: Vec<blas::Node<M>>,
     /// Where the triangles of each mesh start in `leaves`, and their number at the end.
     pub(super) meshes: Vec<u32>,
-    /// Leaf of every triangle that was added, or [`NO_LEAF`].
+    /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`].
     pub(super) leaves: Vec<u32>,
+    /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
+    pub(super) scales: Vec<f32>,
     pub(super) environment: Environment,
     pub(super) illumination: Illumination,
-    /// Energy of all triangles together, without the suns: weight times area, times mean radiance for portals.
+    /// Energy of all triangles together, without the suns: weight times area, times mean radiance for portals. Zero
+    /// only if nothing is sent.
     pub(super) energy: f32,
     /// Whether any triangle is a portal.
     pub(super) portals: bool,
+    /// What the tree costs, now and as it was built: see [`Self::decay`].
+    pub(super) cost: f64,
+    pub(super) cost_at_build: f64,
 }
 
 /// All lights of a scene in borrowed memory: plain data that can be mapped from a file or shared between processes.
@@ -45,6 +54,7 @@ pub struct LightSamplerView<'a, const N: usize = 8, const M: usize = 4> {
     pub(super) cells: &'a [blas::Node<M>],
     pub(super) meshes: &'a [u32],
     pub(super) leaves: &'a [u32],
+    pub(super) scales: &'a [f32],
     pub(super) environment: EnvironmentView<'a>,
     pub(super) illumination: Illumination,
     pub(super) energy: f32,
@@ -68,6 +78,7 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
             cells: &self.cells,
             meshes: &self.meshes,
             leaves: &self.leaves,
+            scales: &self.scales,
             environment: self.environment.as_view(),
             illumination: self.illumination,
             energy: self.energy,
@@ -108,7 +119,10 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             + size_of_val(self.tlas.parents)
             + size_of_val(self.tlas.spreads)
             + size_of_val(self.tlas.leaves);
-        let triangles = size_of_val(self.triangles) + size_of_val(self.meshes) + size_of_val(self.leaves);
+        let triangles = size_of_val(self.triangles)
+            + size_of_val(self.meshes)
+            + size_of_val(self.leaves)
+            + size_of_val(self.scales);
         let parts = self.environment.parts();
         let environment = size_of_val(&parts.header)
             + size_of_val(parts.means)
@@ -124,7 +138,13 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
         let start = *self.meshes.get(id.mesh as usize)?;
         let end = *self.meshes.get(id.mesh as usize + 1)?;
         let index = start.checked_add(id.triangle).filter(|index| *index < end)?;
-        self.leaves.get(index as usize).copied().filter(|leaf| *leaf != NO_LEAF)
+        self.leaves.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
+    }
+
+    /// What the weight of a triangle is multiplied by.
+    #[inline]
+    pub(super) fn scale(&self, light: &LightTriangle) -> f32 {
+        scale_of(self.scales, light)
     }
 
     /// A triangle as seen from a shading point; `None` if nothing can arrive from it.
@@ -143,7 +163,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 
     /// What the tree over triangles asks for at a shading point.
     pub(super) fn scene<'s>(&'s self, x: &'s ShadingPoint) -> Scene<'s> {
-        Scene { x, triangles: self.triangles, environment: self.environment }
+        Scene { x, triangles: self.triangles, environment: self.environment, sends: self.energy > 0.0 }
     }
 }
 
@@ -152,6 +172,8 @@ pub(super) struct Scene<'a> {
     x: &'a ShadingPoint,
     triangles: &'a [LightTriangle],
     environment: EnvironmentView<'a>,
+    /// Whether any triangle sends anything.
+    sends: bool,
 }
 
 impl tlas::Scene for Scene<'_> {
@@ -165,6 +187,6 @@ impl tlas::Scene for Scene<'_> {
 
     #[inline]
     fn is_visible(&self, leaf: u32) -> bool {
-        self.triangles[leaf as usize].is_visible(self.x)
+        self.sends && self.triangles[leaf as usize].is_visible(self.x)
     }
 }

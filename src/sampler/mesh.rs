@@ -2,6 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::error::{Error, Kind as ErrorKind};
+use crate::light::POSITION_LIMIT;
+
 /// A texture that was handed to a builder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TextureId(pub(super) usize);
@@ -79,4 +82,20 @@ impl<'a> Mesh<'a> {
         self.sides = sides;
         self
     }
+}
+
+/// Whether all positions are finite and small enough, and every index has one.
+pub(super) fn check_triangles(mesh: usize, positions: &[Vec3], indices: &[[u32; 3]]) -> Result<(), Error> {
+    let in_range = |p: &Vec3| p.to_array().iter().all(|x| x.abs() <= POSITION_LIMIT);
+    if let Some(vertex) = positions.iter().position(|p| !in_range(p)) {
+        let value = positions[vertex].to_array();
+        return Err(Error(ErrorKind::Position { mesh, vertex, value, limit: POSITION_LIMIT }));
+    }
+    let vertices = positions.len();
+    for (triangle, indices) in indices.iter().enumerate() {
+        if let Some(&index) = indices.iter().find(|index| **index as usize >= vertices) {
+            return Err(Error(ErrorKind::Index { mesh, triangle, index, vertices }));
+        }
+    }
+    Ok(())
 }

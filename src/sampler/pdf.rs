@@ -36,10 +36,13 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     pub(super) fn pdf_of_hit(&self, hit: &Hit, splitting: Option<&Splitting>) -> f32 {
         let Some(leaf) = self.lights.leaf(hit.triangle) else { return 0.0 };
         let Some(lit) = self.lights.lit(leaf, &self.x) else { return 0.0 };
-        let place = Lattice::from_barycentrics(hit.barycentrics);
+        to_finite(self.density(leaf, Lattice::from_barycentrics(hit.barycentrics), &lit, splitting))
+    }
+
+    /// Density per solid angle of a point of a triangle by all techniques.
+    pub(super) fn density(&self, leaf: u32, place: Lattice, lit: &Lit<'_>, splitting: Option<&Splitting>) -> f64 {
         let count = self.tree_count(leaf, splitting);
-        let drawn = Drawn { leaf, place, count, tree_pdf: self.tree_pdf(leaf, count, place, &lit) };
-        to_finite(self.mixed_pdf(&drawn, lit.point(place)))
+        self.mixed_pdf(&Drawn { leaf, place, count, tree_pdf: self.tree_pdf(leaf, count, place, lit) }, lit)
     }
 
     /// Density per solid angle by the trees of a point of a triangle, which they choose so often.

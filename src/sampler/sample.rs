@@ -1,9 +1,7 @@
 //! A point on the lights for a shading point.
 
-use glam::DVec3;
-
 use super::at::PointSampler;
-use super::suns::{Crossing, Technique};
+use super::suns::Technique;
 use crate::blas::{self, Draw, Lattice};
 use crate::light::Lit;
 use crate::record::{Hit, LightSample};
@@ -41,10 +39,9 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
         self.finish(&Drawn { leaf, place, count, tree_pdf }, &lit)
     }
 
-    /// Draws the point where a direction to a sun first crosses a portal.
+    /// Draws a point on a portal towards a sun.
     pub(super) fn sample_sun(&self, sun: usize, u: [Variate; 2], splitting: Option<&Splitting>) -> Option<LightSample> {
-        let direction = self.lights.environment.sample_sun(sun, u);
-        let Crossing { leaf, place, .. } = self.lights.crossing(&self.x, direction)?;
+        let (leaf, place) = self.sun_point(sun, u)?;
         let lit = self.lights.lit(leaf, &self.x)?;
         let count = self.tree_count(leaf, splitting);
         let tree_pdf = self.tree_pdf(leaf, count, place, &lit);
@@ -54,7 +51,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Everything that a host wants to know of a point that was drawn.
     fn finish(&self, drawn: &Drawn, lit: &Lit<'_>) -> Option<LightSample> {
         let relative = lit.point(drawn.place);
-        let pdf = self.mixed_pdf(drawn, relative);
+        let pdf = self.mixed_pdf(drawn, lit);
         let distance = relative.length();
         let positive = pdf > 0.0 && distance > 0.0 && distance.is_finite();
         positive.then(|| LightSample {
@@ -74,12 +71,8 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
 
     /// Density per solid angle by all techniques together.
     #[inline]
-    pub(super) fn mixed_pdf(&self, drawn: &Drawn, relative: DVec3) -> f64 {
-        let by_trees = self.techniques.trees * drawn.tree_pdf;
-        if self.techniques.is_trees() {
-            return by_trees;
-        }
-        by_trees + self.sun_density_at(relative.normalize_or_zero().as_vec3(), drawn.leaf)
+    pub(super) fn mixed_pdf(&self, drawn: &Drawn, lit: &Lit<'_>) -> f64 {
+        self.techniques.trees * drawn.tree_pdf + self.sun_pdf(drawn.leaf, drawn.place, lit)
     }
 }
 

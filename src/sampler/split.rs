@@ -57,7 +57,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Expected density per solid angle of the samples of [`Self::sample_split`] in a direction: the sum over all
     /// points that the ray crosses.
     pub fn pdf_split_direction(&self, direction: Vec3, splitting: &Splitting) -> f32 {
-        to_finite(self.side_by_side().direction_density(direction, Some(splitting)))
+        to_finite(self.side_by_side().direction_density(direction, None, Some(splitting)))
     }
 
     /// The trees in any case, and one of the suns next to them.

@@ -1,8 +1,8 @@
 //! The environment's suns through the portals: a second technique next to the trees, and the balance of both.
 //!
-//! Whether a sun is seen through a portal is found by a few rays, exactly for a sun that is small and a portal that is
-//! not. What the suns send is then known, the trees know about what the rest sends, and a sample chooses between them
-//! in proportion. A density is the mixture of both.
+//! For every shading point, the portals that a sun is seen through are found, and how much of it each shows. What the
+//! suns send is then known, the trees know about what the rest sends, and a sample chooses between them in proportion.
+//! A density is the mixture of both; the sun's part belongs to the point of the portal like that of the trees.
 
 use core::f32::consts::PI;
 
@@ -11,32 +11,46 @@ use glam::Vec3;
 use super::at::PointSampler;
 use super::lights::LightSamplerView;
 use crate::blas::{self, Lattice, Shape};
-use crate::env::MAX_SUNS;
+use crate::env::{MAX_SUNS, Sun};
 use crate::geometry;
+use crate::light::{Lit, Part, Sunlit};
+use crate::math;
 use crate::record::{Receiver, ShadingPoint};
-use crate::warp::{Variate, pick, sum};
+use crate::warp::{Variate, pick, pick_pair, sum};
 
+/// Most pairs of a sun and a portal triangle that shows some of it. Of a sun with more, directions are drawn as if
+/// there were no walls.
+const MAX_SEEN: usize = 64;
+const _: () = assert!(MAX_SEEN > MAX_SUNS);
+
+/// Stands for all portals.
+const ANY: u32 = u32::MAX;
 /// Least probability of the trees where they may find anything.
 const LEAST_TREES: f32 = 0.02;
 /// Largest estimate of an irradiance, so that sums stay finite.
 const BRIGHTEST: f32 = 1e35;
 
-/// Where a ray first crosses a portal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Crossing {
-    pub(super) leaf: u32,
-    pub(super) place: Lattice,
-    distance: f64,
+/// A sun through a portal.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    /// Or [`ANY`].
+    leaf: u32,
+    sun: u32,
+    part: Part,
 }
 
 /// How often each technique is used at one shading point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Techniques {
-    /// What each sun, and last what the trees are worth.
-    weights: [f32; MAX_SUNS + 1],
+    seen: [Seen; MAX_SEEN],
+    /// Irradiance from each.
+    weights: [f32; MAX_SEEN],
+    count: usize,
+    /// Irradiance from the trees.
+    rest: f32,
     /// Probability of the trees; 1 if they are used anyway.
     pub(super) trees: f64,
-    /// Probability of a sun per weight; 0 if none is seen.
+    /// Probability of a sun through a portal per weight; 0 if none is seen.
     per_weight: f64,
 }
 
@@ -44,12 +58,20 @@ pub(super) struct Techniques {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Technique {
     Trees,
+    /// By its place in the list.
     Sun(usize),
 }
 
 impl Techniques {
     /// The trees alone.
-    const TREES: Self = Self { weights: [0.0; MAX_SUNS + 1], trees: 1.0, per_weight: 0.0 };
+    const TREES: Self = Self {
+        seen: [Seen { leaf: 0, sun: 0, part: Part::WHOLE }; MAX_SEEN],
+        weights: [0.0; MAX_SEEN],
+        count: 0,
+        rest: 1.0,
+        trees: 1.0,
+        per_weight: 0.0,
+    };
 
     /// Whether no sun is seen.
     #[inline]
@@ -57,10 +79,8 @@ impl Techniques {
         self.per_weight == 0.0
     }
 
-    /// Probability of one sun.
-    #[inline]
-    fn sun(&self, sun: usize) -> f64 {
-        f64::from(self.weights[sun]) * self.per_weight
+    fn weights(&self) -> &[f32] {
+        &self.weights[..self.count]
     }
 
     /// Chooses one technique.
@@ -69,9 +89,10 @@ impl Techniques {
         if self.is_trees() {
             return Technique::Trees;
         }
-        match pick(&self.weights, sum(&self.weights), u) {
-            MAX_SUNS => Technique::Trees,
-            sun => Technique::Sun(sun),
+        let suns = sum(self.weights());
+        match pick_pair([suns as f32, self.rest], u) {
+            0 => Technique::Sun(pick(self.weights(), suns, u)),
+            _ => Technique::Trees,
         }
     }
 
@@ -80,13 +101,18 @@ impl Techniques {
         if self.is_trees() {
             return self;
         }
-        Self { trees: 1.0, per_weight: 1.0 / sum(&self.weights[..MAX_SUNS]), ..self }
+        Self { trees: 1.0, per_weight: 1.0 / sum(self.weights()), ..self }
     }
 
     /// Chooses among the suns alone, if any is seen.
     pub(super) fn choose_sun(&self, u: &mut Variate) -> Option<usize> {
-        let suns = &self.weights[..MAX_SUNS];
-        (!self.is_trees()).then(|| pick(suns, sum(suns), u))
+        (!self.is_trees()).then(|| pick(self.weights(), sum(self.weights()), u))
+    }
+
+    fn push(&mut self, leaf: u32, sun: usize, part: Part, weight: f32) {
+        self.seen[self.count] = Seen { leaf, sun: sun as u32, part };
+        self.weights[self.count] = weight;
+        self.count += 1;
     }
 }
 
@@ -101,100 +127,146 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     }
 
     fn weigh(&self, x: &ShadingPoint) -> Techniques {
-        let mut weights = [0.0; MAX_SUNS + 1];
-        for (sun, weight) in weights[..self.environment.suns().len()].iter_mut().enumerate() {
-            *weight = self.sun_irradiance(sun, x);
+        let mut techniques = Techniques::TREES;
+        for sun in 0..self.environment.suns().len() {
+            self.find(sun, x, &mut techniques);
         }
-        let suns: f32 = weights.iter().sum();
+        let suns = sum(techniques.weights()) as f32;
         if !(suns > 0.0 && suns < BRIGHTEST) {
             return Techniques::TREES;
         }
         let trees = self.irradiance_by_trees(x);
-        if trees > 0.0 {
-            weights[MAX_SUNS] = trees.max(LEAST_TREES * suns).min(BRIGHTEST);
-        }
-        let total = sum(&weights);
-        Techniques { weights, trees: f64::from(weights[MAX_SUNS]) / total, per_weight: 1.0 / total }
+        techniques.rest = if trees > 0.0 { trees.max(LEAST_TREES * suns).min(BRIGHTEST) } else { 0.0 };
+        let total = f64::from(suns) + f64::from(techniques.rest);
+        Techniques { trees: f64::from(techniques.rest) / total, per_weight: 1.0 / total, ..techniques }
     }
 
     /// Estimate of the irradiance from all that the trees hold. Zero only if there is none.
     fn irradiance_by_trees(&self, x: &ShadingPoint) -> f32 {
         if let [light] = self.triangles {
             let Some(lit) = self.lit(0, x) else { return 0.0 };
-            return PI * light.root.average * lit.worth(&blas::Cell::root(lit.vertices)).weight;
+            return PI * light.root.average * self.scale(light) * lit.worth(&blas::Cell::root(lit.vertices)).weight;
         }
         self.energy * self.tlas.irradiance(x, &self.scene(x))
     }
 
-    /// Irradiance from a sun through the portals, by its centre and four points around it.
-    fn sun_irradiance(&self, sun: usize, x: &ShadingPoint) -> f32 {
+    /// Appends the portals that a sun is seen through.
+    fn find(&self, sun: usize, x: &ShadingPoint, techniques: &mut Techniques) {
         let axis = self.environment.sun_axis(sun);
-        let sun = self.environment.suns()[sun];
-        if let Receiver::Surface(normal) = x.receiver
-            && normal.dot(axis) <= -sun.sin_radius
-        {
-            return 0.0;
+        let Sun { sin_radius, power, .. } = self.environment.suns()[sun];
+        let cosine = mean_cosine(x.receiver, axis, sin_radius);
+        if cosine == 0.0 {
+            return;
         }
-        let (s, t) = axis.any_orthonormal_pair();
-        let offset = RIM * sun.sin_radius;
-        let directions = [axis, axis + s * offset, axis - s * offset, axis + t * offset, axis - t * offset];
-        let seen = |direction: Vec3| {
-            let transmittance = self.crossing(x, direction).map_or(0.0, |crossing| {
-                let root = self.triangles[crossing.leaf as usize].root;
-                blas::average(self.cells, root, crossing.place)
-            });
-            transmittance * x.cosine(direction.normalize_or_zero())
-        };
-        sun.power * 0.2 * directions.into_iter().map(seen).sum::<f32>()
-    }
-
-    /// The first portal along a ray that lets anything through to `x`.
-    pub(super) fn crossing(&self, x: &ShadingPoint, direction: Vec3) -> Option<Crossing> {
-        let mut first: Option<Crossing> = None;
-        self.tlas.cross(x.position, direction, |leaf| {
+        let start = techniques.count;
+        // Every sun after this one keeps a place.
+        let end = MAX_SEEN - (self.environment.suns().len() - 1 - sun);
+        let mut more = 0.0;
+        let cone = [sin_radius, math::sqrt((1.0 - sin_radius * sin_radius).max(0.0))];
+        self.tlas.meet(x.position, axis, cone, |leaf| {
             let light = &self.triangles[leaf as usize];
-            if !light.is_portal() || !light.is_visible(x) {
+            let scale = self.scale(light);
+            if !light.is_portal() || scale == 0.0 {
                 return;
             }
-            let vertices = light.triangle().exactly_relative_to(x.position);
-            let Some(hit) = geometry::intersect(vertices, direction) else { return };
-            let [b1, b2] = hit.map(f64::from);
-            let distance = (vertices[0] * (1.0 - b1 - b2) + vertices[1] * b1 + vertices[2] * b2).length();
-            // Of equal ones the least leaf, so that it does not matter in which order they are visited.
-            let nearer = first.is_none_or(|first| (distance, leaf) < (first.distance, first.leaf));
-            if nearer {
-                first = Some(Crossing { leaf, place: Lattice::from_barycentrics(hit), distance });
+            if more > 0.0 {
+                more += 1.0;
+                return;
+            }
+            let Some(lit) = self.lit(leaf, x) else { return };
+            self.sunlit(&lit, sun).visit(self.cells, light.root, &mut |part, through| {
+                if techniques.count < end {
+                    techniques.push(leaf, sun, part, through * scale * cosine);
+                } else {
+                    more += 1.0;
+                }
+            });
+        });
+        if more > 0.0 {
+            let found = &techniques.weights[start..end];
+            let all = sum(found) as f32 * (1.0 + more / found.len() as f32);
+            techniques.count = start;
+            techniques.push(ANY, sun, Part::WHOLE, all.min(power * cosine));
+        }
+    }
+
+    pub(super) fn sunlit<'s>(&'s self, lit: &'s Lit<'s>, sun: usize) -> Sunlit<'s> {
+        Sunlit { lit, environment: self.environment, sun }
+    }
+
+    /// Of the portals that a ray crosses the one with the least number, and where.
+    fn least_crossed(&self, x: &ShadingPoint, direction: Vec3) -> Option<(u32, Lattice)> {
+        let mut least: Option<(u32, Lattice)> = None;
+        self.tlas.cross(x.position, direction, |leaf| {
+            let light = &self.triangles[leaf as usize];
+            if !light.is_portal()
+                || self.scale(light) == 0.0
+                || least.is_some_and(|(least, _)| least < leaf)
+                || !light.is_visible(x)
+            {
+                return;
+            }
+            if let Some(hit) = geometry::intersect(light.triangle().exactly_relative_to(x.position), direction) {
+                least = Some((leaf, Lattice::from_barycentrics(hit)));
             }
         });
-        first
+        least
     }
 }
 
 impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
-    /// Density per solid angle of a direction by the suns, unless it first crosses a portal in one leaf.
-    pub(super) fn sun_density(&self, direction: Vec3, except: Option<u32>) -> f64 {
-        self.sun_density_if(direction, |leaf| Some(leaf) != except)
+    /// Draws a point on a portal towards a sun, by its place in the list.
+    pub(super) fn sun_point(&self, index: usize, u: [Variate; 2]) -> Option<(u32, Lattice)> {
+        let Seen { leaf, sun, part } = self.techniques.seen[index];
+        let (lights, sun) = (&self.lights, sun as usize);
+        if leaf == ANY {
+            return lights.least_crossed(&self.x, lights.environment.sample_sun(sun, u));
+        }
+        let lit = lights.lit(leaf, &self.x)?;
+        Some((leaf, lights.sunlit(&lit, sun).sample(lights.cells, part, u)?))
     }
 
-    /// Density per solid angle of a direction by the suns, if it first crosses a portal in this leaf.
-    pub(super) fn sun_density_at(&self, direction: Vec3, leaf: u32) -> f64 {
-        self.sun_density_if(direction, |first| first == leaf)
-    }
-
+    /// Density per solid angle of a point of a portal by the suns.
     #[inline]
-    fn sun_density_if(&self, direction: Vec3, counts: impl Fn(u32) -> bool) -> f64 {
+    pub(super) fn sun_pdf(&self, leaf: u32, place: Lattice, lit: &Lit<'_>) -> f64 {
         if self.techniques.is_trees() {
             return 0.0;
         }
-        let Some((sun, pdf)) = self.lights.environment.sun_at(direction) else { return 0.0 };
-        let chosen = self.techniques.sun(sun);
-        if chosen == 0.0 {
-            return 0.0;
+        let direction = lit.point(place).normalize_or_zero().as_vec3();
+        let pairs = self.techniques.seen.iter().zip(self.techniques.weights());
+        let term = |(&seen, &weight): (&Seen, &f32)| {
+            if seen.leaf != ANY && (seen.leaf != leaf || !seen.part.domain.holds(place)) {
+                return 0.0;
+            }
+            match self.lights.environment.sun_excess(seen.sun as usize, direction) {
+                0.0 => 0.0,
+                excess => {
+                    f64::from(weight) * f64::from(excess) * self.sun_pdf_per_excess(seen, leaf, place, lit, direction)
+                }
+            }
+        };
+        self.techniques.per_weight * pairs.map(term).sum::<f64>()
+    }
+
+    /// Density per solid angle of a point of a portal by one sun, over the sun's excess there.
+    fn sun_pdf_per_excess(&self, seen: Seen, leaf: u32, place: Lattice, lit: &Lit<'_>, direction: Vec3) -> f64 {
+        let (lights, sun) = (&self.lights, seen.sun as usize);
+        if seen.leaf == ANY {
+            let is_least = lights.least_crossed(&self.x, direction).is_some_and(|(least, _)| least == leaf);
+            return if is_least { 1.0 / f64::from(lights.environment.suns()[sun].power) } else { 0.0 };
         }
-        let crossing = self.lights.crossing(&self.x, direction);
-        if crossing.is_some_and(|crossing| counts(crossing.leaf)) { chosen * f64::from(pdf) } else { 0.0 }
+        lights.sunlit(lit, sun).pdf_per_excess(lights.cells, seen.part, place)
     }
 }
 
-/// How far from a sun's centre, in radii, it is looked at: half of its area lies within.
-const RIM: f32 = 0.7;
+/// Mean weight of the directions of a cone. Zero only if all of them are below the horizon.
+fn mean_cosine(receiver: Receiver, axis: Vec3, sin_radius: f32) -> f32 {
+    match receiver {
+        Receiver::Surface(normal) => {
+            let (cosine, above) = (normal.dot(axis), normal.dot(axis) + sin_radius);
+            if cosine >= sin_radius { cosine } else { above.max(0.0) * above.max(0.0) / (4.0 * sin_radius) }
+        }
+        Receiver::Transmissive(normal) => normal.dot(axis).abs().max(0.5 * sin_radius),
+        Receiver::Volume => 1.0,
+    }
+}

@@ -57,10 +57,9 @@ impl<const N: usize> Node<N> {
             Outgoing::Diffuse => flux,
             Outgoing::Beam(beam) => {
                 let energies = if beam.portals_apart { portal } else { flux };
-                let (two_sided, (axis, cos, sin), (_, _, normal)) = (self.two_sided(), self.cones(), self.moments());
                 core::array::from_fn(|i| {
-                    let vector = |rows: &[[f32; N]; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
-                    energies[i] * beam.projection(vector(&axis), [sin[i], cos[i]], vector(&normal), two_sided[i])
+                    let (axis, cone, normal) = self.cone(i);
+                    energies[i] * beam.projection(axis, cone, normal, self.is_two_sided(i))
                 })
             }
         };

@@ -1,19 +1,14 @@
-//! From the binary tree to a wide one: each wide node is a cut through the binary tree below it, made by replacing,
-//! again and again, the node of largest error by its two children.
+//! From the binary tree to a wide one, whose nodes are cuts through the binary tree below them.
 
 use alloc::vec::Vec;
 
 use super::build::BinaryNode;
-use super::node::{Child, Node, Slot, Spread, Tlas};
+use super::forest::{Cut, forests};
+use super::node::{Node, Slot, Spread, Tlas};
 
-/// A wide node that waits for its children: its binary node, and the lane that refers to it.
-struct Pending {
-    binary: usize,
-    parent: Slot,
-}
-
-/// Collapses a binary tree. Returns the wide tree with the lights in the order of its leaves, which follows the
-/// tree, so that the lights of one node are neighbours in memory.
+/// Collapses a binary tree. Returns the wide tree, whose nodes have no bounds yet, with the lights in the order of its leaves, which follows the
+/// tree, so that the lights of one node are neighbours in memory. So are the nodes below one node; and what is below
+/// the first of them comes before what is below the second.
 pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u32>) {
     let mut tlas = Tlas { nodes: Vec::new(), parents: Vec::new(), spreads: Vec::new(), leaves: Vec::new() };
     let mut lights = Vec::with_capacity(binary.len() / 2 + 1);
@@ -22,72 +17,37 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
         lights.push(leaf.link);
         return (tlas, lights);
     }
-    let total = binary[0].bounds.energy();
-    let energies = leaf_moments(binary, total);
-    let mut pending = Vec::from([Pending { binary: 0, parent: Slot::ROOT }]);
-    while let Some(Pending { binary: root, parent }) = pending.pop() {
-        let index = tlas.nodes.len();
-        tlas.nodes.push(Node::empty());
-        tlas.parents.push(parent);
-        tlas.spreads.push(energies[root]);
-        if let Some((node, lane)) = parent.get::<N>() {
-            tlas.nodes[node].set(lane, Child::Node(index as u32), &binary[root].bounds, &binary[root].moments);
+    let forests = forests::<N>(binary);
+    tlas.push(Slot::ROOT);
+    // Wide nodes that wait for their children, each with its binary node.
+    let mut pending = Vec::from([(0, 0)]);
+    while let Some((index, root)) = pending.pop() {
+        let cut = Cut::new(binary, &forests, root);
+        let members = || cut.members().iter().copied();
+        let nodes = members().filter(|&below| binary[below].count > 1);
+        let leaves = members().filter(|&below| binary[below].count == 1);
+        let first = tlas.nodes.len();
+        for lane in 0..nodes.clone().count() {
+            tlas.push(Slot::new::<N>(index, lane));
         }
-        let mut cut = [0; N];
-        let width = make_cut(binary, root, &mut cut);
-        for (lane, &below) in cut[..width].iter().enumerate() {
-            if binary[below].count == 1 {
-                tlas.nodes[index].set(
-                    lane,
-                    Child::Leaf(lights.len() as u32),
-                    &binary[below].bounds,
-                    &binary[below].moments,
-                );
-                tlas.leaves.push(Slot::new::<N>(index, lane));
-                lights.push(binary[below].link);
-            }
+        let node_count = tlas.nodes.len() - first;
+        tlas.nodes[index] = Node::new(first, node_count, lights.len(), cut.members().len());
+        for (lane, below) in (node_count..).zip(leaves) {
+            tlas.leaves.push(Slot::new::<N>(index, lane));
+            lights.push(binary[below].link);
         }
-        // Last in, first out: the leftmost child comes next.
-        let inner = cut[..width].iter().enumerate().rev().filter(|&(_, &below)| binary[below].count > 1);
-        pending.extend(inner.map(|(lane, &below)| Pending { binary: below, parent: Slot::new::<N>(index, lane) }));
+        // Last in, first out: the first child comes next.
+        let waiting = pending.len();
+        pending.extend((first..).zip(nodes));
+        pending[waiting..].reverse();
     }
     (tlas, lights)
 }
 
-/// Fills `cut` with up to `N` binary nodes below `root`, in the tree's order, and counts them.
-fn make_cut<const N: usize>(binary: &[BinaryNode], root: usize, cut: &mut [usize; N]) -> usize {
-    cut[0] = root;
-    let mut width = 1;
-    while width < N {
-        let error = |&lane: &usize| binary[cut[lane]].bounds.cost(0.0);
-        let widest = (0..width)
-            .filter(|&lane| binary[cut[lane]].count > 1)
-            .max_by(|a, b| error(a).total_cmp(&error(b)).then(binary[cut[*a]].count.cmp(&binary[cut[*b]].count)));
-        let Some(lane) = widest else { break };
-        let parent = cut[lane];
-        cut.copy_within(lane + 1..width, lane + 2);
-        cut[lane] = parent + 1;
-        cut[lane + 1] = parent + binary[parent].link as usize;
-        width += 1;
+impl<const N: usize> Tlas<N> {
+    fn push(&mut self, parent: Slot) {
+        self.nodes.push(Node::new(0, 0, 0, 0));
+        self.parents.push(parent);
+        self.spreads.push(Spread::default());
     }
-    width
-}
-
-/// Count, mean and variance of the leaves' energies, relative to `total`, below every binary node.
-fn leaf_moments(binary: &[BinaryNode], total: f32) -> Vec<Spread> {
-    // Sum and sum of squares, children before parents: a child always lies behind its parent.
-    let mut sums = Vec::from_iter(binary.iter().map(|node| {
-        let energy = f64::from(node.bounds.energy()) / f64::from(total);
-        (energy, energy * energy)
-    }));
-    for i in (0..binary.len()).rev().filter(|&i| binary[i].count > 1) {
-        let (left, right) = (sums[i + 1], sums[i + binary[i].link as usize]);
-        sums[i] = (left.0 + right.0, left.1 + right.1);
-    }
-    let spread = |(node, &(sum, squares)): (&BinaryNode, &(f64, f64))| {
-        let count = f64::from(node.count);
-        let mean = sum / count;
-        Spread { count: count as f32, mean: mean as f32, variance: (squares / count - mean * mean).max(0.0) as f32 }
-    };
-    binary.iter().zip(&sums).map(spread).collect()
 }

@@ -7,10 +7,10 @@
 
 use glam::Vec3;
 
-use super::node::{Child, Node};
-use crate::math;
+use super::node::{ALL, Child, MEAN_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
+use crate::math::{self, at_least, only_if};
 use crate::record::{Receiver, ShadingPoint};
-use crate::warp::keep_possible;
+use crate::warp::{keep_least, within_range};
 
 /// What the tree asks of the level above.
 pub(crate) trait Scene {
@@ -29,6 +29,11 @@ const LEAST_COSINE: f32 = 1e-3;
 /// Relative error granted to the dot products that decide on culling.
 const ROUNDING: f32 = 1e-5;
 
+/// Cosine at the lights up to which a single triangle may be seen edge-on: covers the rounding of normals.
+const EDGE: f32 = 3e-3;
+/// Least squared distance, so that nothing overflows.
+const LEAST_SQUARED: f32 = 1e-30;
+
 // How much of a variance counts, found by experiment: docs/ACCURACY.md.
 
 /// Of the normals' variance, along the line of sight.
@@ -40,102 +45,143 @@ const RECEIVER_SHARE: f32 = 0.8;
 /// Of the positions' variance, for the squared distance.
 const DISTANCE_SHARE: f32 = 0.3;
 
+/// A shading point, as the loop over lanes wants it.
+pub(super) struct Sight {
+    position: Vec3,
+    /// What the cosine at the receiver is taken with; zero in a medium.
+    normal: Vec3,
+    /// Bits of the cosine that count: all but its sign, where both sides receive.
+    cosine_bits: u32,
+    /// Least cosine at the receiver; 1 in a medium, where it replaces the cosine.
+    least_cosine: f32,
+    /// The normal of the horizon, and one for no horizon.
+    horizon: Vec3,
+    lift: f32,
+}
+
+impl Sight {
+    #[inline(always)]
+    pub(super) fn new(x: &ShadingPoint) -> Self {
+        let position = x.position;
+        let (all, unsigned) = (u32::MAX, u32::MAX >> 1);
+        let (normal, cosine_bits, least_cosine, horizon, lift) = match x.receiver {
+            Receiver::Surface(normal) => (normal, all, LEAST_COSINE, normal, 0.0),
+            Receiver::Transmissive(normal) => (normal, unsigned, LEAST_COSINE, Vec3::ZERO, 1.0),
+            Receiver::Volume => (Vec3::ZERO, all, 1.0, Vec3::ZERO, 1.0),
+        };
+        Self { position, normal, cosine_bits, least_cosine, horizon, lift }
+    }
+}
+
 /// Weights of a node's children before the level above was asked anything.
-struct Terms<const N: usize> {
+struct Estimates<const N: usize> {
     /// Zero where nothing can arrive.
-    geometry: [f32; N],
-    /// Where the bounds do not decide whether a single triangle is visible.
-    doubtful: [bool; N],
+    weights: [f32; N],
+    /// Bits of the largest weight.
+    largest: u32,
+    /// A set of bits: leaves of which the bounds do not decide whether they are visible.
+    doubtful: u32,
 }
 
 impl<const N: usize> Node<N> {
     /// Weight of every child. All zero where nothing below the node can be visible.
-    #[inline]
-    pub(super) fn weights(&self, x: &ShadingPoint, scene: &impl Scene) -> [f32; N] {
-        let terms = self.terms(x);
-        let [flux, portal] = self.energies();
-        let mut weights = [0.0; N];
-        for lane in 0..N {
-            weights[lane] = flux[lane] * terms.geometry[lane];
+    #[inline(always)]
+    pub(super) fn weights(&self, x: &Sight, scene: &impl Scene) -> [f32; N] {
+        let Estimates { mut weights, mut largest, doubtful } = self.estimates(x);
+        if doubtful != 0 || { self.portals } != [0; N] {
+            largest = self.ask(x, scene, &mut weights, doubtful);
         }
-        let mut possible = terms.geometry.map(|term| term > 0.0);
-        for lane in 0..N {
-            if terms.doubtful[lane]
-                && possible[lane]
-                && let Child::Leaf(leaf) = self.child(lane)
-            {
-                possible[lane] = scene.is_visible(leaf);
-            }
-            if portal[lane] > 0.0 && possible[lane] {
-                let aabb = self.aabb(lane);
-                let radiance = scene.radiance(aabb.center() - x.position, 0.5 * aabb.extent().length());
-                weights[lane] += portal[lane] * radiance * terms.geometry[lane];
-                possible[lane] = radiance > 0.0 || flux[lane] > 0.0;
-            }
-        }
-        keep_possible(&mut weights, |lane| possible[lane]);
+        keep_least(&mut weights, largest);
         weights
     }
 
-    /// The geometric terms of all lanes, in plain loops over arrays that a compiler can turn into vectors.
+    /// Asks the level above about leaves in doubt and about what is seen through portals, and returns the bits of the
+    /// largest weight.
+    #[inline(never)]
+    fn ask(&self, x: &Sight, scene: &impl Scene, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
+        while doubtful != 0 {
+            let lane = doubtful.trailing_zeros() as usize;
+            doubtful &= doubtful - 1;
+            let Child::Leaf(leaf) = self.child(lane) else { continue };
+            if !scene.is_visible(leaf) {
+                weights[lane] = 0.0;
+            }
+        }
+        self.look_through(x, scene, weights);
+        weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()))
+    }
+
+    /// Multiplies what comes through portals by what is seen there.
+    fn look_through(&self, x: &Sight, scene: &impl Scene, weights: &mut [f32; N]) {
+        for (lane, weight) in weights.iter_mut().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            let share = f32::from(self.portals[lane]) * (1.0 / f32::from(ALL));
+            if share > 0.0 {
+                let aabb = self.aabb(lane);
+                let radiance = scene.radiance(aabb.center() - x.position, 0.5 * aabb.extent().length());
+                let factor = 1.0 - share + share * radiance;
+                *weight = only_if(factor > 0.0, within_range(*weight * factor));
+            }
+        }
+    }
+
+    /// The geometry of all lanes, in one plain loop over arrays that a compiler can turn into vectors.
     #[inline(always)]
-    fn terms(&self, x: &ShadingPoint) -> Terms<N> {
-        let (normal, folded, ignored) = match x.receiver {
-            Receiver::Surface(normal) => (normal, false, false),
-            Receiver::Transmissive(normal) => (normal, true, false),
-            Receiver::Volume => (Vec3::ZERO, false, true),
-        };
-        let (occupied, two_sided) = (self.occupied(), self.two_sided());
-        let ([low, high], (axis, cos_o, sin_o), (mean, variance, mean_normal)) =
-            (self.boxes(), self.cones(), self.moments());
-        let mut geometry = [0.0; N];
-        let mut doubtful = [false; N];
+    fn estimates(&self, x: &Sight) -> Estimates<N> {
+        let (normals, energies, centers, halves) = (self.normals, self.energies, self.centers, self.halves);
+        let (means, deviations, lengths, tangents) = (self.means, self.deviations, self.lengths, self.tangents);
+        // Relative to the shading point before anything else: far from the origin the difference is what is exact.
+        let origin = Vec3::from_array(self.origin) - x.position;
+        let step = Vec3::from_array(self.steps.map(wide));
+        let half_step = 0.5 * step;
+        let mean_step = half_step * (1.0 / MEAN_STEPS);
+        let (horizon, absolute_horizon, normal) = (x.horizon, x.horizon.abs(), x.normal);
+        let mut weights = [0.0; N];
+        let (mut largest, mut doubtful) = (0, 0);
         for i in 0..N {
-            // Relative to the shading point before halving: far from the origin the difference is what is exact.
-            let from = Vec3::new(low[0][i], low[1][i], low[2][i]) - x.position;
-            let to = Vec3::new(high[0][i], high[1][i], high[2][i]) - x.position;
-            let (center, half) = (0.5 * (from + to), 0.5 * (to - from));
+            let counts = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
+            let half = counts * half_step;
+            let center = Vec3::new(f32::from(centers[0][i]), f32::from(centers[1][i]), f32::from(centers[2][i]));
+            let center = origin + center * step;
 
             // The horizon, by the most and the least favourable corner of the box.
-            let (height, reach) = (normal.dot(center), normal.abs().dot(half));
-            let slack = ROUNDING * (normal.abs().dot(center.abs()) + reach);
+            let (height, reach) = (horizon.dot(center) + x.lift, absolute_horizon.dot(half));
+            let slack = ROUNDING * (absolute_horizon.dot(center.abs()) + reach);
             let below = height + reach < -slack;
-            let above = height - reach > slack;
+            let straddles = !(height - reach > slack);
 
-            // The emitters' side: cos θ' of θ' = max(0, θ - θo - θu), with the ball around the box for θu.
-            let (radius2, distance2) = (half.length_squared(), center.length_squared().max(f32::MIN_POSITIVE));
-            let inside = !(distance2 > radius2);
-            let sin2_u = (radius2 / distance2).min(1.0);
-            let (cos_u, sin_u) = (math::sqrt(1.0 - sin2_u), math::sqrt(sin2_u));
-            let signed =
-                -(axis[0][i] * center.x + axis[1][i] * center.y + axis[2][i] * center.z) / math::sqrt(distance2);
-            let cos = if two_sided[i] { signed.abs() } else { signed };
-            let sin = math::sqrt((1.0 - cos * cos).max(0.0));
-            let (cos_less, sin_less) = (cos * cos_o[i] + sin * sin_o[i], sin * cos_o[i] - cos * sin_o[i]);
-            let away = cos < cos_o[i] && cos_less < cos_u && cos_less * cos_u + sin_less * sin_u < -ROUNDING && !inside;
+            // The emitters' side: the angle between the axis and the direction to any point of the box, by the box's
+            // nearest corner along the axis and the ball around it across.
+            let bits = normals[i];
+            let axis = Vec3::new(Self::component(bits, 0), Self::component(bits, 1), Self::component(bits, 2));
+            let (radius2, distance2) = (half.length_squared(), center.length_squared());
+            let along = axis.dot(center);
+            let across = math::sqrt(at_least(distance2 - along * along, 0.0)) + math::sqrt(radius2);
+            let root = f32::from(tangents[i]) * (1.0 / TANGENT_STEPS);
+            let away = along - axis.abs().dot(half) > root * root * across;
+            let culled = below | (away & (tangents[i] != WIDE)) | (energies[i] == 0);
 
             // What arrives, by the moments.
-            let to_mean = Vec3::new(mean[0][i], mean[1][i], mean[2][i]) - x.position;
-            let squared = (to_mean.length_squared() + DISTANCE_SHARE * variance[i]).max(f32::MIN_POSITIVE);
-            let inverse = 1.0 / math::sqrt(squared);
-            let relative = variance[i] * inverse * inverse;
-            let cos_s = normal.dot(to_mean) * inverse;
-            let receiver = clamped_mean(if folded { cos_s.abs() } else { cos_s }, RECEIVER_SHARE * relative);
-            let n = Vec3::new(mean_normal[0][i], mean_normal[1][i], mean_normal[2][i]);
-            let facing = -n.dot(to_mean) * inverse;
-            let spread = NORMAL_SHARE * (1.0 - n.length_squared()).max(0.0) + EMITTER_SHARE * relative;
-            let emitter = clamped_mean(if two_sided[i] { facing.abs() } else { facing }, spread);
-            let term = (if ignored { 1.0 } else { receiver.max(LEAST_COSINE) })
-                * emitter.max(LEAST_COSINE)
-                * inverse
-                * inverse;
+            let mean = Vec3::new(f32::from(means[0][i]), f32::from(means[1][i]), f32::from(means[2][i]));
+            let to_mean = center + mean * (counts * mean_step);
+            let deviation = f32::from(deviations[i]) * (1.0 / 255.0);
+            let length = f32::from(lengths[i]) * (1.0 / 255.0);
+            let variance = deviation * deviation * radius2;
+            let squared = at_least(to_mean.length_squared() + DISTANCE_SHARE * variance, LEAST_SQUARED);
+            let (inverse2, distance) = (1.0 / squared, math::sqrt(squared));
+            let side = f32::from_bits(normal.dot(to_mean).to_bits() & x.cosine_bits);
+            let receiver = at_least(clamped_mean(side, RECEIVER_SHARE * variance), x.least_cosine * distance);
+            let facing = f32::from_bits((-length * axis.dot(to_mean)).to_bits() & !(bits & TWO_SIDED));
+            let spread = NORMAL_SHARE * (1.0 - length * length) * squared + EMITTER_SHARE * variance;
+            let emitter = at_least(clamped_mean(facing, spread), LEAST_COSINE * distance);
+            let term = (receiver * inverse2) * emitter * inverse2;
 
-            let culled = !occupied[i] || away || (below && !folded && !ignored);
-            // Positive whatever underflows: only what is culled is impossible.
-            geometry[i] = if culled { 0.0 } else { term.max(f32::MIN_POSITIVE) };
-            doubtful[i] = facing.abs() < ROUNDING * 10.0 || facing < 0.0 || !(above || folded || ignored);
+            let energy = wide(energies[i]);
+            weights[i] = only_if(!culled, within_range(energy * term));
+            largest = largest.max(weights[i].to_bits());
+            doubtful |= u32::from((straddles | (facing < EDGE * distance)) & !culled) << i;
         }
-        Terms { geometry, doubtful }
+        let leaves = (1u32 << self.width).wrapping_sub(1 << self.node_count);
+        Estimates { weights, largest, doubtful: doubtful & leaves }
     }
 }
 

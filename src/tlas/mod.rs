@@ -4,11 +4,16 @@
 //! asks of the level above through [`Scene`].
 
 mod beam;
+mod bins;
 mod build;
 mod collapse;
 mod descend;
+mod encode;
+mod fit;
+mod forest;
 mod importance;
 mod node;
+mod progress;
 mod ray;
 mod split;
 #[cfg(test)]
@@ -19,4 +24,5 @@ pub(crate) use beam::{Beam, Outgoing};
 pub(crate) use build::build;
 pub(crate) use importance::Scene;
 pub(crate) use node::{MAX_LEAVES, Tlas, TlasView};
+pub(crate) use progress::Report;
 pub use split::Splitting;

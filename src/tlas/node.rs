@@ -5,40 +5,64 @@ use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::bounds::{LightBounds, Moments};
 use crate::geometry::Aabb;
-use crate::math;
 
-/// Marks a child that is a leaf; the other bits below [`TWO_SIDED`] are its number.
-const LEAF: u32 = 1 << 31;
-/// Marks a child that holds a two-sided light.
-const TWO_SIDED: u32 = 1 << 30;
 /// Most leaves that a tree can number.
 pub(crate) const MAX_LEAVES: usize = (1 << 28) - 1;
-/// A lane without a child.
-const EMPTY: u32 = u32::MAX;
 
-/// Widening of a cluster's cone of normals, in radians: covers the rounding of its construction in `f32`.
-const CONE_MARGIN: f32 = 1e-4;
+/// Bit of [`Node::normals`] that marks a two-sided light.
+pub(super) const TWO_SIDED: u32 = 1 << 31;
+/// Largest component of a normal, in the ten bits that it has.
+pub(super) const NORMAL_STEPS: f32 = 511.0;
+/// Code of a cone of normals so wide that something always faces the shading point.
+pub(super) const WIDE: u8 = u8::MAX;
+/// Largest code of a share.
+pub(super) const ALL: u8 = u8::MAX;
+/// Largest code of a mean position, at the side of the box.
+pub(super) const MEAN_STEPS: f32 = 127.0;
+/// Root of the tangent of a cone's half angle, in steps.
+pub(super) const TANGENT_STEPS: f32 = 64.0;
 
-const ROWS: usize = 21;
-const CHILD: usize = 0;
-const MIN: usize = 1;
-const MAX: usize = 4;
-const AXIS: usize = 7;
-const COS: usize = 10;
-const SIN: usize = 11;
-const FLUX: usize = 12;
-const PORTAL: usize = 13;
-const MEAN: usize = 14;
-const VARIANCE: usize = 17;
-const NORMAL: usize = 18;
-
-/// `N` children, one a lane: a row of references, then rows of `f32` bits (the talk's `TLASNode`, with the energy in
-/// two rows: one that arrives the same from everywhere, one to be multiplied by what is seen through a portal).
-#[repr(transparent)]
+/// Up to `N` children, in few bits each (after Ylitie, Karras and Laine 2017): first other nodes, which are neighbours
+/// in memory, then leaves, whose numbers are neighbours. What proves that a child is dark is rounded to the safe side:
+/// boxes and cones only grow.
+///
+/// Numbers of two bytes are the upper half of an `f32`.
+#[repr(C, packed)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub(crate) struct Node<const N: usize>([[u32; N]; ROWS]);
+pub(crate) struct Node<const N: usize> {
+    /// Least corner of all boxes.
+    pub(super) origin: [f32; 3],
+    /// The first child that is a node.
+    pub(super) first_node: u32,
+    /// The first child that is a leaf.
+    pub(super) first_leaf: u32,
+    /// Direction of the mean normal, which is the axis of the cone of normals as well: ten bits a component, and
+    /// [`TWO_SIDED`].
+    pub(super) normals: [u32; N],
+    /// Energies; zero where there is no child.
+    pub(super) energies: [u16; N],
+    /// Unit of the boxes along each axis.
+    pub(super) steps: [u16; 3],
+    /// Number of children that are nodes.
+    pub(super) node_count: u8,
+    /// Number of children.
+    pub(super) width: u8,
+    /// Centres of the boxes, in steps from the origin.
+    pub(super) centers: [[u8; N]; 3],
+    /// Halves of the boxes' edges, in halves of a step.
+    pub(super) halves: [[u8; N]; 3],
+    /// Mean positions: from -127 to 127 across the box.
+    pub(super) means: [[i8; N]; 3],
+    /// Standard deviations of the positions, relative to half the boxes' diagonals.
+    pub(super) deviations: [u8; N],
+    /// Lengths of the mean normals: the shorter, the more the normals differ.
+    pub(super) lengths: [u8; N],
+    /// Tangents of the half angles of the cones of normals, by their roots; or [`WIDE`].
+    pub(super) tangents: [u8; N],
+    /// Shares of the energies to be multiplied by what is seen through a portal. 0 and [`ALL`] are exact.
+    pub(super) portals: [u8; N],
+}
 
 /// What a lane of a node refers to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,121 +75,90 @@ pub(crate) enum Child {
     Leaf(u32),
 }
 
+/// A number of two bytes.
+#[inline(always)]
+pub(super) fn wide(bits: u16) -> f32 {
+    f32::from_bits(u32::from(bits) << 16)
+}
+
 impl<const N: usize> Node<N> {
-    /// A node without children.
-    pub(super) fn empty() -> Self {
-        let mut node = Self([[0; N]; ROWS]);
-        node.0[CHILD] = [EMPTY; N];
-        node
-    }
-
-    /// Writes one child and its bounds.
-    pub(super) fn set(&mut self, lane: usize, child: Child, bounds: &LightBounds, moments: &Moments) {
-        let side = if bounds.two_sided { TWO_SIDED } else { 0 };
-        self.0[CHILD][lane] = match child {
-            Child::Empty => EMPTY,
-            Child::Node(index) => index | side,
-            Child::Leaf(number) => number | LEAF | side,
-        };
-        let (sin, cos) = math::sin_cos((bounds.normals.theta + CONE_MARGIN).min(core::f32::consts::PI));
-        let mut write = |row: usize, value: f32| self.0[row][lane] = value.to_bits();
-        for axis in 0..3 {
-            write(MIN + axis, bounds.aabb.min[axis]);
-            write(MAX + axis, bounds.aabb.max[axis]);
-            write(AXIS + axis, bounds.normals.axis[axis]);
-            write(MEAN + axis, moments.mean[axis]);
-            write(NORMAL + axis, moments.normal[axis]);
+    /// A node whose children are known, but nothing of them.
+    pub(super) fn new(first_node: usize, node_count: usize, first_leaf: usize, width: usize) -> Self {
+        Self {
+            first_node: first_node as u32,
+            first_leaf: first_leaf as u32,
+            node_count: node_count as u8,
+            width: width as u8,
+            ..Zeroable::zeroed()
         }
-        write(VARIANCE, moments.variance);
-        write(COS, cos);
-        write(SIN, sin.max(0.0));
-        write(FLUX, bounds.flux);
-        write(PORTAL, bounds.portal);
     }
 
+    #[inline(always)]
     pub(super) fn child(&self, lane: usize) -> Child {
-        let reference = self.0[CHILD][lane];
-        match reference {
-            EMPTY => Child::Empty,
-            _ if reference & LEAF != 0 => Child::Leaf(reference & !(LEAF | TWO_SIDED)),
-            _ => Child::Node(reference & !TWO_SIDED),
+        let lane = lane as u32;
+        let nodes = u32::from(self.node_count);
+        if lane < nodes {
+            Child::Node(self.first_node.wrapping_add(lane))
+        } else if lane < u32::from(self.width) {
+            Child::Leaf(self.first_leaf.wrapping_add(lane - nodes))
+        } else {
+            Child::Empty
         }
     }
 
-    /// A row of floats.
+    /// A component of a lane's normal.
     #[inline(always)]
-    fn row(&self, row: usize) -> [f32; N] {
-        self.0[row].map(f32::from_bits)
-    }
-
-    /// Three rows of floats, one an axis.
-    #[inline(always)]
-    fn vectors(&self, row: usize) -> [[f32; N]; 3] {
-        [self.row(row), self.row(row + 1), self.row(row + 2)]
-    }
-
-    /// One for each lane that holds a two-sided light, else zero.
-    #[inline(always)]
-    pub(super) fn two_sided(&self) -> [bool; N] {
-        self.0[CHILD].map(|reference| reference & TWO_SIDED != 0)
-    }
-
-    /// Lanes that refer to a child.
-    #[inline(always)]
-    pub(super) fn occupied(&self) -> [bool; N] {
-        self.0[CHILD].map(|reference| reference != EMPTY)
-    }
-
-    /// Corners of the boxes.
-    #[inline(always)]
-    pub(super) fn boxes(&self) -> [[[f32; N]; 3]; 2] {
-        [self.vectors(MIN), self.vectors(MAX)]
-    }
-
-    /// Axes of the cones of normals, and the cosines and sines of their half angles.
-    #[inline(always)]
-    pub(super) fn cones(&self) -> ([[f32; N]; 3], [f32; N], [f32; N]) {
-        (self.vectors(AXIS), self.row(COS), self.row(SIN))
-    }
-
-    /// Mean positions, variances of the position, and mean normals.
-    #[inline(always)]
-    pub(super) fn moments(&self) -> ([[f32; N]; 3], [f32; N], [[f32; N]; 3]) {
-        (self.vectors(MEAN), self.row(VARIANCE), self.vectors(NORMAL))
+    pub(super) fn component(normal: u32, axis: u32) -> f32 {
+        ((normal << (22 - 10 * axis)).cast_signed() >> 22) as f32 * (1.0 / NORMAL_STEPS)
     }
 
     /// Energies that do not depend on the direction, and those of portals.
     #[inline(always)]
     pub(super) fn energies(&self) -> [[f32; N]; 2] {
-        [self.row(FLUX), self.row(PORTAL)]
+        let (energies, portals) = (self.energies, self.portals);
+        let (mut flux, mut portal) = ([0.0; N], [0.0; N]);
+        for lane in 0..N {
+            let energy = wide(energies[lane]);
+            let share = f32::from(portals[lane]) * (1.0 / f32::from(ALL));
+            (flux[lane], portal[lane]) = (energy * (1.0 - share), energy * share);
+        }
+        [flux, portal]
     }
 
-    /// The corners of one box.
+    /// The cone of normals of a lane, by its axis and the sine and cosine of its half angle, and the mean normal.
+    pub(super) fn cone(&self, lane: usize) -> (Vec3, [f32; 2], Vec3) {
+        let normal = self.normals[lane];
+        let axis = Vec3::from_array([0, 1, 2].map(|axis| Self::component(normal, axis))).normalize_or_zero();
+        let mean = axis * f32::from(self.lengths[lane]) * (1.0 / 255.0);
+        if self.tangents[lane] == WIDE {
+            return (axis, [1.0, 0.0], mean);
+        }
+        let root = f32::from(self.tangents[lane]) / TANGENT_STEPS;
+        let tangent = root * root;
+        let cos = 1.0 / crate::math::sqrt(1.0 + tangent * tangent);
+        (axis, [tangent * cos, cos], mean)
+    }
+
+    pub(super) fn is_two_sided(&self, lane: usize) -> bool {
+        self.normals[lane] & TWO_SIDED != 0
+    }
+
+    /// The corners of one box. Each is rounded once, so that it still holds what it was made for.
     #[inline(always)]
     pub(super) fn aabb(&self, lane: usize) -> Aabb {
-        let corner = |row: usize| Vec3::from_array([0, 1, 2].map(|axis| self.value(row + axis, lane)));
-        Aabb { min: corner(MIN), max: corner(MAX) }
-    }
-
-    #[inline(always)]
-    fn value(&self, row: usize, lane: usize) -> f32 {
-        f32::from_bits(self.0[row][lane])
-    }
-
-    /// Whether no energy of a lane is negative.
-    pub(super) fn has_energies(&self, lane: usize) -> bool {
-        self.value(FLUX, lane) >= 0.0 && self.value(PORTAL, lane) >= 0.0 && self.value(VARIANCE, lane) >= 0.0
-    }
-
-    /// Every value of a lane but its reference.
-    pub(super) fn values(&self, lane: usize) -> impl Iterator<Item = f32> + '_ {
-        (CHILD + 1..ROWS).map(move |row| self.value(row, lane))
+        let (origin, steps) = (self.origin, self.steps);
+        let corner = |axis: usize, sign: f32| {
+            let halves = 2.0 * f32::from(self.centers[axis][lane]) + sign * f32::from(self.halves[axis][lane]);
+            origin[axis] + halves * (0.5 * wide(steps[axis]))
+        };
+        let corners = [-1.0, 1.0].map(|sign| Vec3::from_array([0, 1, 2].map(|axis| corner(axis, sign))));
+        Aabb { min: corners[0], max: corners[1] }
     }
 }
 
 /// What splitting needs to know of all leaves below a node: energies relative to the whole tree's.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub(crate) struct Spread {
     /// Number of leaves, as a float, for it is only multiplied.
     pub(super) count: f32,
@@ -173,6 +166,14 @@ pub(crate) struct Spread {
     pub(super) mean: f32,
     /// Variance of the energy of the leaves.
     pub(super) variance: f32,
+}
+
+impl Spread {
+    /// The same of energies that are multiplied.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.mean = (f64::from(self.mean) * factor) as f32;
+        self.variance = (f64::from(self.variance) * factor * factor) as f32;
+    }
 }
 
 /// Where the walk from a node or leaf to the root goes on: the lane that refers to it.

@@ -55,7 +55,7 @@ impl<const N: usize> TlasView<'_, N> {
         let mut weights = [0.0; N];
         loop {
             if arriving && depth < splitting.levels && self.is_split(node, x, &measure) {
-                weights = self.nodes[node].weights(x, scene);
+                weights = self.nodes[node].weigh(x, scene);
             } else if arriving {
                 if let Some((leaf, count)) = self.sample_below(node, x, scene, &mut variate(draws)) {
                     visit(leaf, count);
@@ -67,7 +67,7 @@ impl<const N: usize> TlasView<'_, N> {
             if lane == N {
                 let Some((parent, from)) = self.parents[node].get::<N>() else { return };
                 (node, lane, depth) = (parent, from + 1, depth - 1);
-                weights = self.nodes[node].weights(x, scene);
+                weights = self.nodes[node].weigh(x, scene);
                 continue;
             }
             match self.nodes[node].child(lane) {
@@ -93,7 +93,7 @@ impl<const N: usize> TlasView<'_, N> {
         // A node splits only below split nodes: `count` assumes that all above do, `pmf` that none does.
         let (mut count, mut pmf) = (1.0, 1.0);
         for (i, (node, lane)) in (0..).zip(self.path(leaf)) {
-            let share = warp::pmf(&self.nodes[node].weights(x, scene), lane);
+            let share = warp::pmf_wide(&self.nodes[node].weigh(x, scene), lane);
             pmf *= share;
             let depth = height - 1 - i;
             if !(depth < splitting.levels && self.is_split(node, x, &measure)) {

@@ -4,13 +4,25 @@ use alloc::vec::Vec;
 
 use glam::Vec3;
 
+use super::descend::{Draw, Follow};
 use super::node::{Child, TlasView};
-use super::{Scene, Splitting, Tlas, build};
+use super::{Scene, Splitting, Tlas};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::record::ShadingPoint;
+use crate::simd::Level;
 use crate::testing::Pcg32;
 use crate::warp::{Variate, seed};
+
+type Light = (LightBounds, Moments);
+
+/// The tree over lights, and the lights in the order of its leaves.
+fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
+    let (mut tlas, order) =
+        super::build(lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
+    tlas.fit(&|leaf| lights[order[leaf as usize] as usize]);
+    (tlas, order)
+}
 
 /// Leaves are all visible, and portals show the same in every direction.
 struct Open;
@@ -38,7 +50,7 @@ impl Scene for Odd {
     }
 }
 
-fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<(LightBounds, Moments)> {
+fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<Light> {
     let size = 0.3 / (n as f32).cbrt();
     let light = |_| {
         let center = Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
@@ -68,13 +80,13 @@ fn shading_point(i: usize, pcg: &mut Pcg32) -> ShadingPoint {
 
 /// Probability of ending below a node where every weight is zero.
 fn dead_mass<const N: usize>(tlas: &TlasView<'_, N>, node: usize, x: &ShadingPoint, scene: &impl Scene) -> f64 {
-    let weights = tlas.nodes[node].weights(x, scene);
+    let weights = tlas.nodes[node].weigh(x, scene);
     if weights == [0.0; N] {
         return 1.0;
     }
     let below = |lane| match tlas.nodes[node].child(lane) {
         Child::Node(index) if weights[lane] > 0.0 => {
-            crate::warp::pmf(&weights, lane) * dead_mass(tlas, index as usize, x, scene)
+            crate::warp::pmf_wide(&weights, lane) * dead_mass(tlas, index as usize, x, scene)
         }
         _ => 0.0,
     };
@@ -117,6 +129,43 @@ fn a_sample_has_the_probability_of_its_leaf() {
             assert!((pmf / again - 1.0).abs() < 1e-12, "leaf {leaf}: {pmf} {again}");
         }
     }
+}
+
+#[test]
+fn all_instruction_sets_give_the_same_bits() {
+    let mut pcg = Pcg32::new(11, 1);
+    for scale in [1.0, 1e-6, 1e8] {
+        let mut lights = cloud(3000, &mut pcg);
+        for (bounds, moments) in &mut lights {
+            bounds.aabb = Aabb { min: bounds.aabb.min * scale, max: bounds.aabb.max * scale };
+            (moments.mean, moments.variance) = (moments.mean * scale, moments.variance * scale * scale);
+        }
+        same_bits::<4>(&lights, scale, &mut pcg);
+        same_bits::<8>(&lights, scale, &mut pcg);
+        same_bits::<16>(&lights, scale, &mut pcg);
+    }
+}
+
+fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg: &mut Pcg32) {
+    let (tlas, _) = build::<N>(lights);
+    let tlas = &tlas.view();
+    let mut found = 0;
+    for i in 0..3000 {
+        let x = &shading_point(i, pcg);
+        let x = &ShadingPoint { position: x.position * scale, ..*x };
+        let u = pcg.next_f32();
+        let draw = |level: Level| {
+            let mut u = Variate::new(u, seed(&[u]));
+            let drawn = level.run(Draw { tlas, node: 0, x, scene: &Odd, u: &mut u });
+            let pmf = drawn.map(|(leaf, _)| level.run(Follow { tlas, leaf, x, scene: &Odd }).to_bits());
+            (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), pmf, u.value().to_bits())
+        };
+        let mut all = Level::all().map(draw);
+        let first = all.next();
+        found += usize::from(first.is_some_and(|(drawn, ..)| drawn.is_some()));
+        assert!(all.all(|other| Some(other) == first));
+    }
+    assert!(found > 2000, "{found} drawn");
 }
 
 #[test]

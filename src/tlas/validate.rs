@@ -1,7 +1,10 @@
 //! Checks of a tree that comes from outside, after which no walk can leave it or go round in circles.
 
-use super::node::{Child, Slot, TlasView};
+use super::node::{Child, Node, Slot, TlasView, wide};
 use crate::error::Error;
+
+/// Largest coordinate and largest step of a box: what is made of them stays finite.
+const FAR: f32 = 1e15;
 
 impl<const N: usize> TlasView<'_, N> {
     /// Whether every reference stays inside and points forward, every parent pointer leads back, every leaf is
@@ -20,6 +23,9 @@ impl<const N: usize> TlasView<'_, N> {
         let mut nodes = 1;
         Error::unless_equal("parent of the root", usize::from(self.parents[0] != Slot::ROOT), 0)?;
         for index in 0..self.nodes.len() {
+            if !self.nodes[index].is_sound() {
+                return Err(Error::bytes("values of node", index, 0, 0));
+            }
             for lane in 0..N {
                 self.validate_lane(index, lane)?;
                 match self.nodes[index].child(lane) {
@@ -48,12 +54,25 @@ impl<const N: usize> TlasView<'_, N> {
         if slot != Some(&here) {
             return Err(Error::bytes("parent of the child in this lane", index, lane, lane));
         }
-        if !node.values(lane).all(f32::is_finite) || !node.has_energies(lane) {
-            return Err(Error::bytes("values of this lane", index, lane, lane));
-        }
         let spread = &self.spreads[index];
         let finite =
             [spread.count, spread.mean, spread.variance].iter().all(|value| value.is_finite() && *value >= 0.0);
         if finite { Ok(()) } else { Err(Error::bytes("spread", index, 0, 0)) }
+    }
+}
+
+impl<const N: usize> Node<N> {
+    /// Whether there are no more children than lanes, and no value is one that sampling could stumble over. Codes of
+    /// one byte are all good.
+    fn is_sound(&self) -> bool {
+        let (origin, steps, energies) = (self.origin, self.steps, self.energies);
+        let energies = energies.iter().map(|&energy| wide(energy)).enumerate();
+        self.node_count <= self.width
+            && usize::from(self.width) <= N
+            && origin.iter().all(|value| value.abs() <= FAR)
+            && steps.iter().all(|&step| (0.0..=FAR).contains(&wide(step)))
+            && energies
+                .map(|(lane, energy)| (lane < self.width.into(), energy))
+                .all(|(is_child, energy)| if is_child { energy > 0.0 && energy < f32::INFINITY } else { energy == 0.0 })
     }
 }

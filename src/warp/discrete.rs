@@ -1,5 +1,6 @@
 //! Choosing one of a few weights.
 
+use crate::math::{at_least, at_most, only_if};
 use crate::warp::variate::Variate;
 
 /// Sum of the weights, in the precision that [`pick`] wants.
@@ -25,18 +26,45 @@ const WEIGHT_RANGE: (f32, f32) = (1e-30, 1e30);
 
 /// Makes every choice that is possible really so, whatever overflow or underflow has made of its weight, and
 /// every other weight zero.
-#[inline]
+#[inline(always)]
 pub(crate) fn keep_possible<const N: usize>(weights: &mut [f32; N], possible: impl Fn(usize) -> bool) {
-    let mut largest = 0.0;
+    let mut largest = 0;
     for (i, weight) in weights.iter_mut().enumerate() {
-        // `max` first: it also swallows the NaN of 0 · ∞.
-        *weight = if possible(i) { weight.max(WEIGHT_RANGE.0).min(WEIGHT_RANGE.1) } else { 0.0 };
-        largest = weight.max(largest);
+        *weight = only_if(possible(i), within_range(*weight));
+        largest = largest.max(weight.to_bits());
     }
-    let least = LEAST_SHARE * largest;
-    for weight in weights.iter_mut().filter(|weight| **weight > 0.0) {
-        *weight = weight.max(least);
+    keep_least(weights, largest);
+}
+
+/// A weight that sums and quotients bear; also for the NaN of 0 · ∞.
+#[inline(always)]
+pub(crate) fn within_range(weight: f32) -> f32 {
+    at_most(at_least(weight, WEIGHT_RANGE.0), WEIGHT_RANGE.1)
+}
+
+/// Gives every positive weight its least share. `largest` are the bits of the largest weight, which of positive
+/// numbers are ordered as the numbers are: integers can be compared in any order, so that loops become vectors.
+#[inline(always)]
+pub(crate) fn keep_least<const N: usize>(weights: &mut [f32; N], largest: u32) {
+    let least = LEAST_SHARE * f32::from_bits(largest);
+    for weight in weights {
+        *weight = only_if(*weight > 0.0, at_least(*weight, least));
     }
+}
+
+/// The sums of all weights up to each, in the precision that a choice wants, and of zero and the one before the same.
+#[inline(always)]
+fn ends<const N: usize>(weights: &[f32; N]) -> [f64; N] {
+    let mut ends = [0.0; N];
+    let mut end = 0.0;
+    // By pairs, which halves the chain of sums that wait for each other.
+    for i in (0..N).step_by(2) {
+        let (first, second) = (f64::from(weights[i]), f64::from(weights[i + 1]));
+        ends[i] = end + first;
+        end += first + second;
+        ends[i + 1] = end;
+    }
+    ends
 }
 
 /// Chooses an index in proportion to its weight, and stretches the variate for the next choice.
@@ -60,6 +88,34 @@ pub(crate) fn pick(weights: &[f32], total: f64, variate: &mut Variate) -> usize 
     }
     variate.stretch(target - low, f64::from(weights[chosen]), total);
     chosen
+}
+
+/// Probability with which [`pick_wide`] picks an index.
+#[inline(always)]
+pub(crate) fn pmf_wide<const N: usize>(weights: &[f32; N], i: usize) -> f64 {
+    match weights[i] {
+        0.0 => 0.0,
+        weight => f64::from(weight) / ends(weights)[N - 1],
+    }
+}
+
+/// [`pick`] of an array's weights, without branches. Returns the index with its probability, or `None` where all
+/// weights are zero.
+#[inline(always)]
+pub(crate) fn pick_wide<const N: usize>(weights: &[f32; N], variate: &mut Variate) -> Option<(usize, f64)> {
+    let ends = ends(weights);
+    let total = ends[N - 1];
+    if total == 0.0 {
+        return None;
+    }
+    let target = variate.value() * total;
+    // A value below one leaves the target below the total, so that a weight is found, and never one of zero.
+    let passed: i64 = ends.iter().map(|&end| i64::from(target >= end)).sum();
+    let chosen = (passed as usize).min(N - 1);
+    let low = if chosen > 0 { ends[chosen - 1] } else { 0.0 };
+    let width = f64::from(weights[chosen]);
+    variate.stretch(target - low, width, total);
+    Some((chosen, width / total))
 }
 
 /// [`pick`] of two weights, without branches.
@@ -109,10 +165,10 @@ mod tests {
 
     #[test]
     fn possible_weights_stay_possible() {
-        let mut weights = [0.0, f32::INFINITY, f32::NAN, 1.0, 1e-45, 7.0];
-        keep_possible(&mut weights, |i| i != 5);
+        let mut weights = [0.0, f32::INFINITY, f32::NAN, 1.0, 1e-45, 7.0, 0.0, 3.0];
+        keep_possible(&mut weights, |i| i < 5);
         assert!(weights[..5].iter().all(|w| *w > 0.0 && w.is_finite()), "{weights:?}");
-        assert_eq!(weights[5], 0.0);
+        assert_eq!(weights[5..], [0.0; 3]);
         assert!((0..5).all(|i| pmf(&weights, i) > 0.0));
         assert_eq!(pmf(&weights, 5), 0.0);
         assert_eq!(pmf(&[0.0; 3], 1), 0.0);
@@ -144,6 +200,30 @@ mod tests {
             let mut b = a;
             assert_eq!(pick(&weights, sum(&weights), &mut a), pick_pair(weights, &mut b));
             assert_eq!(a.value(), b.value());
+        }
+    }
+
+    #[test]
+    fn an_array_is_picked_as_a_slice_is() {
+        let mut pcg = Pcg32::new(8, 5);
+        for i in 0..100_000 {
+            let weights: [f32; 8] = core::array::from_fn(|lane| {
+                let zero = (i >> lane) & 1 == 1;
+                if zero { 0.0 } else { pcg.next_f32() * [1.0, 1e-20, 1e20, 1e-12][(i + lane) % 4] }
+            });
+            let u = [pcg.next_f32(), 0.0, 1.0 - f32::EPSILON / 2.0][i % 3];
+            let (mut a, mut b) = (Variate::new(u, i as u64), Variate::new(u, i as u64));
+            let total = sum(&weights);
+            match pick_wide(&weights, &mut b) {
+                None => assert_eq!(total, 0.0),
+                Some((lane, share)) => {
+                    assert_eq!(lane, pick(&weights, total, &mut a));
+                    assert_eq!(share, pmf_wide(&weights, lane));
+                    assert!((share / pmf(&weights, lane) - 1.0).abs() < 1e-15);
+                    assert!(share > 0.0);
+                    assert!((a.value() - b.value()).abs() < 1e-9);
+                }
+            }
         }
     }
 

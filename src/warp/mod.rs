@@ -5,5 +5,5 @@ pub(crate) mod equal_area;
 pub(crate) mod triangle;
 pub(crate) mod variate;
 
-pub(crate) use discrete::{keep_possible, pick, pick_pair, pmf, sum};
+pub(crate) use discrete::{keep_least, keep_possible, pick, pick_pair, pick_wide, pmf, pmf_wide, sum, within_range};
 pub(crate) use variate::{Variate, seed};

@@ -60,6 +60,13 @@ impl BinaryTree {
         self.nodes[at].bounds
     }
 
+    /// Bounds of a node, and its children or, of a leaf, its light.
+    pub(super) fn node(&self, at: usize) -> (&LightBounds, Result<[usize; 2], usize>) {
+        let Node { bounds, link } = &self.nodes[at];
+        let is_leaf = link & LEAF != 0;
+        (bounds, if is_leaf { Err((link & !LEAF) as usize) } else { Ok([at + 1, *link as usize]) })
+    }
+
     /// Draws a light. `u` comes back rescaled.
     pub(crate) fn sample(&self, x: &ShadingPoint, u: &mut f64) -> Option<(usize, f64)> {
         let (mut at, mut pmf) = (0, 1.0);

@@ -1,6 +1,6 @@
 //! The crate itself.
 
-use ::fanlight::{Hit, Illumination, LightSampler, Mesh, ShadingPoint, Weight};
+use ::fanlight::{Hit, Illumination, LightSample, LightSampler, Mesh, ShadingPoint, Weight};
 
 use super::{Drawn, Method};
 use crate::scenes::sky::environment;
@@ -39,18 +39,30 @@ impl<'a> Fanlight<'a> {
     }
 }
 
-impl Method for Fanlight<'_> {
+impl Fanlight<'_> {
+    pub(crate) fn sampler(&self) -> &LightSampler {
+        &self.sampler
+    }
+
+    /// A sample as all methods return it.
     #[inline]
-    fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
-        let sample = self.sampler.sample(x, u)?;
-        let pdf = if self.layered { self.sampler.pdf_sample_direction(x, &sample) } else { sample.pdf };
-        Some(Drawn {
+    pub(crate) fn drawn(&self, sample: &LightSample, pdf: f32) -> Drawn {
+        Drawn {
             light: self.scene.light_index(sample.hit.triangle),
             barycentrics: sample.hit.barycentrics,
             direction: sample.direction,
             pdf: f64::from(pdf),
             radiance: None,
-        })
+        }
+    }
+}
+
+impl Method for Fanlight<'_> {
+    #[inline]
+    fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
+        let sample = self.sampler.sample(x, u)?;
+        let pdf = if self.layered { self.sampler.pdf_sample_direction(x, &sample) } else { sample.pdf };
+        Some(self.drawn(&sample, pdf))
     }
 
     #[inline]
@@ -69,5 +81,9 @@ impl Method for Fanlight<'_> {
 
     fn bytes(&self) -> usize {
         self.sampler.as_view().bytes().iter().sum()
+    }
+
+    fn draws_suns_apart(&self) -> bool {
+        self.scene.sky.is_some() && !self.sampler.environment().as_view().suns().is_empty()
     }
 }

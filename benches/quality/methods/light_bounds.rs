@@ -48,6 +48,17 @@ impl LightBounds {
     /// as was meant.
     #[inline]
     pub(crate) fn importance(&self, x: &ShadingPoint) -> f32 {
+        self.importance_with(x, f32::abs)
+    }
+
+    /// The importance as Conty Estevez and Kulla have it: nothing arrives from below the receiver's horizon.
+    #[inline]
+    pub(crate) fn one_sided_importance(&self, x: &ShadingPoint) -> f32 {
+        self.importance_with(x, |cosine| cosine)
+    }
+
+    #[inline]
+    fn importance_with(&self, x: &ShadingPoint, receiver_cosine: impl Fn(f32) -> f32) -> f32 {
         let to_point = x.position - self.center();
         let distance2 = to_point.length_squared();
         let radius2 = 0.25 * (self.max - self.min).length_squared();
@@ -64,7 +75,7 @@ impl LightBounds {
         }
         let importance = self.phi * cos_p / distance2.max(radius2);
         let Receiver::Surface(normal) = x.receiver else { return importance };
-        let cos_i = normal.dot(wi).abs();
+        let cos_i = receiver_cosine(-normal.dot(wi));
         (importance * cos_sub_clamped(sine(cos_i), cos_i, sin_b, cos_b)).max(0.0)
     }
 }

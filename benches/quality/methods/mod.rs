@@ -9,15 +9,18 @@ mod fanlight;
 mod light_bounds;
 mod power;
 mod rectified;
+mod talk;
 mod tessellated;
 mod texel_cdf;
 mod triangle;
+mod wide_tree;
 
 use ::fanlight::{Illumination, ShadingPoint};
 use glam::Vec3;
 
+pub(crate) use self::fanlight::Fanlight;
 use crate::scenes::Scene;
-pub(crate) use arvo::barycentrics;
+pub(crate) use arvo::{barycentrics, crosses};
 pub(crate) use discrete::Cumulative;
 pub(crate) use triangle::OnTriangle;
 use triangle::{Choice, ThenPoint};
@@ -55,17 +58,23 @@ pub(crate) trait Method: Sync {
         false
     }
 
+    /// Whether directions into the sun are drawn without a choice of a triangle, so that the probabilities of triangles
+    /// are not those of all samples.
+    fn draws_suns_apart(&self) -> bool {
+        false
+    }
+
     /// Whether it is so slow that only its choice of a triangle is evaluated.
     fn is_slow(&self) -> bool {
         false
     }
 }
 
-/// Methods that are run on a workload by default.
+/// Methods that are run on a workload, or a variant of it, by default.
 pub(crate) fn names(workload: &str) -> &'static [&'static str] {
     match workload {
-        "cloud-10000" | "sphere-29" => &["fanlight", "power", "binary-tree", "every-light"],
-        "cloud-100000" => &["fanlight", "power", "binary-tree"],
+        "cloud-10000" | "sphere-29" => &["fanlight", "talk-tree", "power", "binary-tree", "every-light"],
+        "cloud-100000" => &["fanlight", "talk-tree", "power", "binary-tree"],
         "quad" => &[
             "fanlight",
             "talk-conservative",
@@ -81,6 +90,8 @@ pub(crate) fn names(workload: &str) -> &'static [&'static str] {
             "talk-conservative",
             "talk-point-to-point",
             "talk-boundary",
+            "power",
+            "every-light",
             "uniform-area",
             "uniform-solid-angle",
             "texel-cdf",
@@ -90,27 +101,48 @@ pub(crate) fn names(workload: &str) -> &'static [&'static str] {
             "talk-conservative",
             "talk-point-to-point",
             "talk-boundary",
+            "talk-footprint",
             "environment-reject",
             "uniform-solid-angle",
             "rectified",
         ],
-        _ => &["fanlight", "environment-reject", "uniform-solid-angle", "rectified"],
+        "grid-1" => &["fanlight", "talk-footprint", "environment-reject", "uniform-solid-angle", "rectified"],
+        "nested" | "grid-100" => &[
+            "fanlight",
+            "talk-footprint",
+            "environment-reject",
+            "power",
+            "every-light",
+            "uniform-solid-angle",
+            "rectified",
+        ],
+        "grid-10000" => {
+            &["fanlight", "talk-footprint", "environment-reject", "power", "uniform-solid-angle", "rectified"]
+        }
+        // What does not see the clip map does the same as without.
+        _ => &["fanlight", "talk-footprint", "uniform-solid-angle", "rectified"],
     }
 }
 
 /// Builds the data that a method needs for a scene.
 pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
-    let talk = |illumination| Box::new(fanlight::Fanlight::new(scene, Some(illumination)));
+    let talk = |illumination| Box::new(Fanlight::new(scene, Some(illumination)));
     match name {
-        "fanlight" => Box::new(fanlight::Fanlight::new(scene, None)),
+        "fanlight" => Box::new(Fanlight::new(scene, None)),
         "talk-conservative" => talk(Illumination::Conservative),
         "talk-point-to-point" => talk(Illumination::PointToPoint),
         "talk-boundary" => talk(Illumination::Boundary),
+        "talk-footprint" => Box::new(talk::Talk::new(scene)),
         "power" => Box::new(ThenPoint::new(scene, Choice::Power(power::Power::new(scene)), OnTriangle::SolidAngle)),
         "binary-tree" | "uniform-solid-angle" => {
             Box::new(ThenPoint::new(scene, triangle::best_choice(scene), OnTriangle::SolidAngle))
         }
         "uniform-area" => Box::new(ThenPoint::new(scene, triangle::best_choice(scene), OnTriangle::Area)),
+        "talk-tree" => {
+            let binary = binary_tree::BinaryTree::new(&binary_tree::scene_bounds(scene));
+            let choice = Choice::Wide(wide_tree::WideTree::new(&binary));
+            Box::new(ThenPoint::new(scene, choice, OnTriangle::SolidAngle))
+        }
         "every-light" => {
             let choice = Choice::Every(every_light::EveryLight::new(scene));
             Box::new(ThenPoint::new(scene, choice, OnTriangle::SolidAngle))

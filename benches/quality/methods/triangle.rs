@@ -7,14 +7,20 @@ use super::arvo::{SphericalTriangle, barycentrics, crosses};
 use super::binary_tree::{BinaryTree, scene_bounds};
 use super::every_light::EveryLight;
 use super::power::Power;
+use super::wide_tree::WideTree;
 use super::{Drawn, Method};
 use crate::oracle::lambert::solid_angle;
 use crate::scenes::Scene;
+
+/// Number of lights up to which it is quick to look at every one.
+const FEW: usize = 200;
 
 /// How a triangle is chosen.
 pub(crate) enum Choice {
     Power(Power),
     Tree(BinaryTree),
+    /// The talk's, by the conservative term.
+    Wide(WideTree),
     Every(EveryLight),
     /// In proportion to the solid angles: uniform over an opening of two triangles.
     SolidAngle,
@@ -87,6 +93,7 @@ impl<'a> ThenPoint<'a> {
         match &self.choice {
             Choice::Power(power) => Some(power.table.sample(u)),
             Choice::Tree(tree) => tree.sample(x, &mut f64::from(u)),
+            Choice::Wide(tree) => tree.sample(f64::from(u), |bounds| bounds.one_sided_importance(x)),
             Choice::Every(every) => every.sample(x, u),
             Choice::SolidAngle => {
                 let second = self.second_share(x);
@@ -100,6 +107,7 @@ impl<'a> ThenPoint<'a> {
         match &self.choice {
             Choice::Power(power) => power.table.pmf(light),
             Choice::Tree(tree) => tree.pmf(x, light),
+            Choice::Wide(tree) => tree.pmf(light, |bounds| bounds.one_sided_importance(x)),
             Choice::Every(every) => every.pmf(x, light),
             Choice::SolidAngle if light == 1 => self.second_share(x),
             Choice::SolidAngle => 1.0 - self.second_share(x),
@@ -126,7 +134,7 @@ impl<'a> ThenPoint<'a> {
 }
 
 /// Density per solid angle of a uniform density over the area: `d² / (A cos θ)`.
-fn area_density(vertices: &[DVec3; 3], direction: DVec3) -> f64 {
+pub(super) fn area_density(vertices: &[DVec3; 3], direction: DVec3) -> f64 {
     let [a, b, c] = *vertices;
     let double_normal = (b - a).cross(c - a);
     let double_area = double_normal.length();
@@ -137,7 +145,7 @@ fn area_density(vertices: &[DVec3; 3], direction: DVec3) -> f64 {
 }
 
 /// Whether the origin sees the front of a triangle.
-fn front(vertices: &[DVec3; 3]) -> bool {
+pub(super) fn front(vertices: &[DVec3; 3]) -> bool {
     let [a, b, c] = *vertices;
     (b - a).cross(c - a).dot(a) < 0.0
 }
@@ -186,6 +194,7 @@ impl Method for ThenPoint<'_> {
         let choice = match &self.choice {
             Choice::Power(power) => power.table.bytes(),
             Choice::Tree(tree) => tree.bytes(),
+            Choice::Wide(tree) => tree.bytes(),
             Choice::Every(every) => every.bytes(),
             Choice::SolidAngle => 0,
         };
@@ -193,6 +202,6 @@ impl Method for ThenPoint<'_> {
     }
 
     fn is_slow(&self) -> bool {
-        matches!(self.choice, Choice::Every(_))
+        matches!(self.choice, Choice::Every(_)) && self.triangles.len() > FEW
     }
 }

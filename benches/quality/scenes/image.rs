@@ -50,6 +50,12 @@ impl Image {
         Self::from_fn(4 * k, Filter::Nearest, 0.0, |uv| f32::from(u8::from(is_open(uv.x) && is_open(uv.y))))
     }
 
+    /// One smooth wave along each axis.
+    pub(crate) fn waves() -> Self {
+        let wave = |x: f64| 0.5 + 0.4 * (2.0 * PI * x).sin();
+        Self::from_fn(64, Filter::Bilinear, 0.0, |uv| (wave(uv.x) * wave(uv.y)) as f32)
+    }
+
     /// The same for the crate.
     pub(crate) fn texture(&self) -> Texture<'_> {
         let texture = Texture::new(self.size, self.size, &self.texels).expect("the image is finite");

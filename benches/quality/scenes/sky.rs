@@ -24,14 +24,23 @@ pub(crate) struct Sky {
 }
 
 impl Sky {
+    /// The sky of the workloads.
     pub(crate) fn new() -> Self {
+        Self::with_sun(is_sun)
+    }
+
+    /// The same sky at another time.
+    pub(crate) fn without_sun() -> Self {
+        Self::with_sun(|_| false)
+    }
+
+    fn with_sun(is_sun: impl Fn(DVec3) -> bool) -> Self {
         let center = |i: usize| (i as f64 + 0.5) / SIZE as f64;
         let direction = |k: usize| square_to_sphere(DVec2::new(center(k % SIZE), center(k / SIZE)));
-        let texels: Vec<f32> = (0..SIZE * SIZE)
-            .map(|k| (if is_sun(direction(k)) { SUN } else { smooth(direction(k).z) }) as f32)
-            .collect();
+        let radiance = |d: DVec3| if is_sun(d) { SUN } else { smooth(d.z) };
+        let texels: Vec<f32> = (0..SIZE * SIZE).map(|k| radiance(direction(k)) as f32).collect();
         let environment = environment(&texels);
-        let sun = (0..SIZE * SIZE).filter(|&k| is_sun(direction(k))).flat_map(sun_samples).collect();
+        let sun = (0..SIZE * SIZE).filter(|&k| texels[k] == SUN as f32).flat_map(sun_samples).collect();
         Self { texels, environment, sun }
     }
 

@@ -1,0 +1,4 @@
+//! Pictures of the figures.
+
+pub(crate) mod panels;
+pub(crate) mod scatter;

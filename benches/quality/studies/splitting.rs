@@ -1,0 +1,146 @@
+//! Several samples by splitting the light tree against as many independent ones: error times time.
+
+use core::hint::black_box;
+use std::time::Instant;
+
+use ::fanlight::{LightSample, ShadingPoint, Splitting};
+use smallvec::SmallVec;
+
+use crate::args::Args;
+use crate::comparison::truths;
+use crate::methods::Fanlight;
+use crate::metrics::{Summary, summary};
+use crate::oracle::Truth;
+use crate::parallel::parallel;
+use crate::report::short;
+use crate::scenes::pcg::Pcg32;
+use crate::scenes::{self, Scene};
+use crate::variance::contribution;
+
+const WORKLOADS: [&str; 3] = ["cloud-10000", "cloud-100000", "grid-100"];
+const COUNTS: [f64; 3] = [2.0, 4.0, 8.0];
+/// Most levels to split.
+const LEVELS: u32 = 16;
+
+type Samples = SmallVec<[LightSample; 64]>;
+
+/// How samples are drawn: one, or by splitting.
+type Way = Option<Splitting>;
+
+struct Study<'a> {
+    scene: &'a Scene,
+    method: Fanlight<'a>,
+    points: Vec<(ShadingPoint, Truth)>,
+    samples: usize,
+}
+
+pub(crate) fn run(args: &Args) {
+    println!(
+        "\nSplitting: error x time of independent samples over that of as many by splitting (above 1: splitting wins)"
+    );
+    println!(
+        "{:12} {:>8} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>8}",
+        "workload", "samples", "levels", "threshold", "relvar", "EW", "ns", "gain median", "gain EW"
+    );
+    for workload in WORKLOADS.iter().filter(|workload| args.wants(workload)) {
+        let scene = scenes::scene(workload);
+        let points = truths(&scene, 5 * args.effort.study_points);
+        let method = Fanlight::new(&scene, None);
+        let study = Study { scene: &scene, method, points, samples: args.effort.samples.div_ceil(2) };
+        study.compare(workload, args.effort.calls);
+    }
+}
+
+impl Study<'_> {
+    fn compare(&self, workload: &str, calls: usize) {
+        let one = self.measure(None);
+        let ns = self.nanoseconds(None, calls);
+        let print = |count: f64, Splitting { threshold, levels }, summary: &Summary, nanoseconds: f64| {
+            let gain = |get: fn(&Summary) -> f64| get(&one) * ns / (get(summary) * nanoseconds);
+            println!(
+                "{workload:12} {count:>8.2} {levels:>6} {threshold:>9.3} {:>8} {:>8} {:>8} {:>12} {:>8}",
+                short(summary.median),
+                short(summary.energy_weighted),
+                short(nanoseconds),
+                short(gain(|s| s.median)),
+                short(gain(|s| s.energy_weighted)),
+            );
+        };
+        print(1.0, Splitting { threshold: 0.0, levels: 0 }, &one, ns);
+        for wanted in COUNTS {
+            let splitting = self.splitting(wanted);
+            let way = Some(splitting);
+            print(self.count(&splitting), splitting, &self.measure(way), self.nanoseconds(way, calls));
+        }
+    }
+
+    /// The fewest levels that can give so many samples, and the threshold that gives about so many.
+    fn splitting(&self, count: f64) -> Splitting {
+        let can = |levels: &u32| self.count(&Splitting { threshold: 1.0, levels: *levels }) >= count;
+        let levels = (1..LEVELS).find(can).unwrap_or(LEVELS);
+        let (mut low, mut high) = (0.0_f32, 1.0_f32);
+        for _ in 0..12 {
+            let threshold = 0.5 * (low + high);
+            let is_less = self.count(&Splitting { threshold, levels }) < count;
+            *(if is_less { &mut low } else { &mut high }) = threshold;
+        }
+        Splitting { threshold: 0.5 * (low + high), levels }
+    }
+
+    /// Mean number of samples.
+    fn count(&self, splitting: &Splitting) -> f64 {
+        let mut samples = Samples::new();
+        for (i, (x, _)) in self.points.iter().enumerate() {
+            self.method.sampler().sample_split(x, Pcg32::new(i as u64, 6).uniform3(), splitting, &mut samples);
+        }
+        samples.len() as f64 / self.points.len() as f64
+    }
+
+    /// Calls back with all samples of one set.
+    fn draw(&self, x: &ShadingPoint, u: [f32; 3], way: Way, samples: &mut Samples) {
+        samples.clear();
+        match way {
+            Some(splitting) => self.method.sampler().sample_split(x, u, &splitting, samples),
+            None => samples.extend(self.method.sampler().sample(x, u)),
+        }
+    }
+
+    /// Relative variance of a set.
+    fn measure(&self, way: Way) -> Summary {
+        let at_point = |i: usize, (x, truth): &(ShadingPoint, Truth)| {
+            let mut pcg = Pcg32::new(i as u64, 7);
+            let mut samples = Samples::new();
+            let squares: f64 = (0..self.samples)
+                .map(|_| {
+                    self.draw(x, pcg.uniform3(), way, &mut samples);
+                    let estimate = |sample: &LightSample| {
+                        let drawn = self.method.drawn(sample, sample.pdf);
+                        contribution(self.scene, x, &drawn) / drawn.pdf
+                    };
+                    (samples.iter().map(estimate).sum::<f64>() - truth.total).powi(2)
+                })
+                .sum();
+            (squares / self.samples as f64, truth.total * truth.total)
+        };
+        summary(parallel(&self.points, at_point).into_iter()).expect("there are points")
+    }
+
+    /// Time of a set.
+    fn nanoseconds(&self, way: Way, calls: usize) -> f64 {
+        let points = self.scene.points.timing(calls);
+        let mut pcg = Pcg32::new(3, 3);
+        let inputs: Vec<[f32; 3]> = points.iter().map(|_| pcg.uniform3()).collect();
+        let mut samples = Samples::new();
+        let mut time = || {
+            let start = Instant::now();
+            for (x, u) in points.iter().zip(&inputs) {
+                self.draw(x, *u, way, &mut samples);
+                black_box(&samples);
+            }
+            start.elapsed().as_secs_f64() * 1e9 / calls as f64
+        };
+        let mut times = [0.0; 5].map(|_: f64| time());
+        times.sort_by(f64::total_cmp);
+        times[2]
+    }
+}

@@ -1,0 +1,77 @@
+//! Work on large arrays, side by side with the feature `rayon`. How it is cut into parts does not depend on the number
+//! of threads, so neither does any result.
+
+use alloc::vec::Vec;
+
+/// From this size on work is worth handing to another thread.
+pub(crate) const WORTHWHILE: usize = 4096;
+/// Elements that are summed up in one go.
+const CHUNK: usize = 1 << 15;
+
+/// Runs both, side by side if they handle many elements.
+#[cfg(feature = "rayon")]
+pub(crate) fn both(left: impl FnOnce() + Send, right: impl FnOnce() + Send, size: usize) {
+    if size >= WORTHWHILE {
+        rayon::join(left, right);
+    } else {
+        left();
+        right();
+    }
+}
+
+/// Runs both, one after the other.
+#[cfg(not(feature = "rayon"))]
+pub(crate) fn both(left: impl FnOnce(), right: impl FnOnce(), _size: usize) {
+    left();
+    right();
+}
+
+/// Results for the parts of a slice that is not empty, merged from the first to the last.
+pub(crate) fn reduce<T: Sync, R: Send>(
+    elements: &[T],
+    part: impl Fn(&[T]) -> R + Sync + Send,
+    merge: impl Fn(R, R) -> R,
+) -> R {
+    let (first, rest) = elements.split_at(elements.len().min(CHUNK));
+    if rest.is_empty() {
+        return part(first);
+    }
+    #[cfg(feature = "rayon")]
+    let results: Vec<R> = {
+        use rayon::prelude::*;
+        elements.par_chunks(CHUNK).map(part).collect()
+    };
+    #[cfg(not(feature = "rayon"))]
+    let results: Vec<R> = elements.chunks(CHUNK).map(part).collect();
+    let mut results = results.into_iter();
+    let first = results.next().expect("the slice is not empty");
+    results.fold(first, merge)
+}
+
+/// `element(0..count)` as an array.
+pub(crate) fn collect<T: Send>(count: usize, element: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        (0..count).into_par_iter().with_min_len(WORTHWHILE).map(element).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    (0..count).map(element).collect()
+}
+
+/// Works on every element, side by side if that means to handle many things of some `size`.
+#[cfg(feature = "rayon")]
+pub(crate) fn for_each<T: Send>(elements: &mut [T], size: usize, work: impl Fn(&mut T) + Sync + Send) {
+    use rayon::prelude::*;
+    if size >= WORTHWHILE / 4 {
+        elements.par_iter_mut().for_each(work);
+    } else {
+        elements.iter_mut().for_each(work);
+    }
+}
+
+/// Works on every element, one after the other.
+#[cfg(not(feature = "rayon"))]
+pub(crate) fn for_each<T>(elements: &mut [T], _size: usize, work: impl Fn(&mut T)) {
+    elements.iter_mut().for_each(work);
+}

@@ -1,0 +1,115 @@
+//! The same code compiled for wider vector registers, chosen when the program runs.
+//!
+//! Nothing here computes. A [`Work`] is plain code over arrays, which a compiler turns into vectors of the width that
+//! it may use; products and sums are never fused, so the results are the same bits at every level.
+
+/// Code that is worth compiling for each level.
+pub(crate) trait Work {
+    /// What comes out.
+    type Output;
+
+    /// Does the work. Must be `#[inline(always)]`, and so must all that is to profit.
+    fn run(self) -> Self::Output;
+}
+
+/// Instructions that this machine has: only asking the machine makes one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Level(Set);
+
+#[derive(Clone, Copy, Debug)]
+enum Set {
+    /// What the whole program is compiled for.
+    Baseline,
+    /// 256-bit vectors.
+    #[cfg(all(target_arch = "x86_64", feature = "std"))]
+    Avx2,
+    /// 512-bit vectors.
+    #[cfg(all(target_arch = "x86_64", feature = "std"))]
+    Avx512,
+}
+
+impl Level {
+    /// The widest that this machine has. Cheap, but not free: ask once a traversal.
+    #[inline(always)]
+    pub(crate) fn best() -> Self {
+        #[cfg(all(target_arch = "x86_64", feature = "std"))]
+        {
+            if Set::Avx512.is_available() {
+                return Self(Set::Avx512);
+            }
+            if Set::Avx2.is_available() {
+                return Self(Set::Avx2);
+            }
+        }
+        Self(Set::Baseline)
+    }
+
+    /// All that this machine has.
+    #[cfg(test)]
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
+        [
+            Set::Baseline,
+            #[cfg(all(target_arch = "x86_64", feature = "std"))]
+            Set::Avx2,
+            #[cfg(all(target_arch = "x86_64", feature = "std"))]
+            Set::Avx512,
+        ]
+        .into_iter()
+        .filter(|set| set.is_available())
+        .map(Self)
+    }
+
+    /// Does the work with this level's instructions.
+    #[inline(always)]
+    #[cfg_attr(
+        all(target_arch = "x86_64", feature = "std"),
+        expect(unsafe_code, reason = "the machine was asked whether it has these instructions")
+    )]
+    pub(crate) fn run<W: Work>(self, work: W) -> W::Output {
+        match self.0 {
+            Set::Baseline => work.run(),
+            // SAFETY: a level is made only where the machine has it.
+            #[cfg(all(target_arch = "x86_64", feature = "std"))]
+            Set::Avx2 => unsafe { with_avx2(work) },
+            // SAFETY: as before.
+            #[cfg(all(target_arch = "x86_64", feature = "std"))]
+            Set::Avx512 => unsafe { with_avx512(work) },
+        }
+    }
+}
+
+impl Set {
+    #[inline(always)]
+    #[cfg_attr(not(all(target_arch = "x86_64", feature = "std")), expect(dead_code, reason = "only tests ask"))]
+    fn is_available(self) -> bool {
+        match self {
+            Self::Baseline => true,
+            #[cfg(all(target_arch = "x86_64", feature = "std"))]
+            Self::Avx2 => std::is_x86_feature_detected!("avx2"),
+            #[cfg(all(target_arch = "x86_64", feature = "std"))]
+            Self::Avx512 => std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512vl"),
+        }
+    }
+}
+
+#[cfg(all(target_arch = "x86_64", feature = "std"))]
+#[target_feature(enable = "avx2")]
+fn with_avx2<W: Work>(work: W) -> W::Output {
+    work.run()
+}
+
+#[cfg(all(target_arch = "x86_64", feature = "std"))]
+#[target_feature(enable = "avx2,avx512f,avx512vl")]
+fn with_avx512<W: Work>(work: W) -> W::Output {
+    work.run()
+}
+
+/// The machine's square root, for builds without `std`.
+#[cfg(all(not(feature = "std"), target_arch = "x86_64", target_feature = "sse2"))]
+#[inline(always)]
+#[expect(unsafe_code, reason = "the program is compiled for machines that have this instruction")]
+pub(crate) fn sqrt(x: f32) -> f32 {
+    use core::arch::x86_64::{_mm_cvtss_f32, _mm_set_ss, _mm_sqrt_ss};
+    // SAFETY: the condition above.
+    unsafe { _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x))) }
+}
