@@ -50,6 +50,13 @@ impl Bitmap {
         }
     }
 
+    /// What is stored for the texel at a place, from 0 to 1.
+    pub(crate) fn stored_at(&self, uv: Vec2) -> [f32; 4] {
+        let index = |place: f32, size: usize| ((place * size as f32) as usize).min(size - 1);
+        let texel = self.bytes[index(uv.y, self.height) * self.width + index(uv.x, self.width)];
+        texel.map(|byte| f32::from(byte) / 255.0)
+    }
+
     /// Linear colour and alpha of all texels.
     pub(crate) fn texels(&self) -> impl Iterator<Item = Vec4> {
         self.bytes.iter().map(|&bytes| decode(bytes))

@@ -35,13 +35,24 @@ pub(crate) struct Lights {
 impl Lights {
     /// Hands over all that emits light or lets it in.
     pub(crate) fn new(model: &Model, illumination: Illumination) -> Result<Self, Error> {
+        Self::weighted(model, illumination, |_| 1.0)
+    }
+
+    /// The same with each portal's weight, by its number, times a factor.
+    pub(crate) fn weighted(
+        model: &Model,
+        illumination: Illumination,
+        factor: impl Fn(usize) -> f32,
+    ) -> Result<Self, Error> {
         let emits = |mesh: &&super::mesh::Mesh| model.materials[mesh.material].emits();
         let emitters: Vec<_> = model.meshes.iter().filter(emits).collect();
         let flagged = model.meshes.iter().filter(|mesh| model.is_portal(mesh));
         let portals: Vec<_> = flagged.filter(|mesh| model.materials[mesh.material].has_holes()).collect();
 
         let emission: Vec<_> = emitters.iter().map(|mesh| emission(model, &model.materials[mesh.material])).collect();
-        let transmission: Vec<_> = portals.iter().map(|mesh| clear(model, &model.materials[mesh.material])).collect();
+        let transmission: Vec<_> = (portals.iter().enumerate())
+            .map(|(i, mesh)| clear(model, &model.materials[mesh.material]).times(factor(i)))
+            .collect();
         let mut builder = LightSampler::builder();
         builder.illumination(illumination).environment(environment(model.sky.as_deref())?);
         for (mesh, weight) in emitters.iter().zip(&emission) {
@@ -79,6 +90,18 @@ impl Lights {
     /// The lights as seen from a point in fog.
     pub(crate) fn at_volume(&self, position: Vec3) -> LightsAt<'_> {
         LightsAt(self.sampler.at(&ShadingPoint::volume(position)))
+    }
+
+    /// One direction to a light and its density, for a point of a surface.
+    pub(crate) fn propose(&self, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<Proposal> {
+        LightsAt(self.sampler.at(&ShadingPoint::surface(position, normal))).sample(u)
+    }
+
+    /// A portal's number and a direction through it, as drawn for a point of a surface.
+    pub(crate) fn sample_portal(&self, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<(usize, Vec3)> {
+        let sample = self.sampler.sample(&ShadingPoint::surface(position, normal), u)?;
+        let portal = sample.hit.triangle.mesh.checked_sub(self.emitters)?;
+        Some((portal as usize, sample.direction))
     }
 
     /// Light as it leaves emitters, or comes in through portals.
@@ -201,6 +224,12 @@ impl<'a> Weights<'a> {
     fn new(model: &'a Model, map: Option<usize>, constant: f32, texel: impl Fn(glam::Vec4) -> f32) -> Self {
         let bitmap = map.map(|map| &model.bitmaps[map]);
         Self { constant, texels: bitmap.iter().flat_map(|bitmap| bitmap.texels()).map(texel).collect(), bitmap }
+    }
+
+    fn times(mut self, factor: f32) -> Self {
+        self.constant *= factor;
+        self.texels.iter_mut().for_each(|texel| *texel *= factor);
+        self
     }
 
     fn add<'b>(&'b self, builder: &mut LightSamplerBuilder<'b>, mesh: Mesh<'_>) -> Result<(), Error> {

@@ -20,6 +20,7 @@ pub(crate) struct Fog {
 }
 
 /// Everything that a picture is made of.
+#[derive(Clone)]
 pub(crate) struct Model {
     pub(crate) meshes: Vec<Mesh>,
     pub(crate) materials: Vec<Material>,

@@ -53,9 +53,9 @@ impl Techniques {
         Self { choice, ..self }
     }
 
-    /// The same with points on lights chosen at all vertices, and no light traced.
-    pub(crate) fn at_all_vertices(self) -> Self {
-        Self { vertices: u32::MAX, photons: false, ..self }
+    /// The same with other lights.
+    pub(crate) fn with_lights(self, lights: Lights) -> Self {
+        Self { lights, ..self }
     }
 
     /// The lights as seen from a point of a surface, the path's vertex of that number.

@@ -5,7 +5,7 @@ use core::f32::consts::TAU;
 
 use glam::{Vec3, vec3};
 
-use super::shapes::painted_sky;
+use super::shapes::{overcast, painted_sky};
 use crate::render::{Camera, Lobe, Material, Mesh, Model};
 
 /// A point between all windows.
@@ -15,7 +15,7 @@ const GLASS: f32 = 0.006;
 
 pub(crate) fn car() -> Model {
     let camera = Camera::looking(vec3(0.12, 0.98, 0.95), vec3(-0.05, 0.72, -0.6), 70.0);
-    let mut model = Model::new(camera, Some(painted_sky(overcast)));
+    let mut model = Model::new(camera, Some(painted_sky(bright_above)));
     let panes = panes();
 
     // Its two faces let through what one pane does.
@@ -34,14 +34,11 @@ pub(crate) fn car() -> Model {
     model
 }
 
-/// Bright around the zenith, as where the sun stands behind thin clouds, and a dark road.
-fn overcast(direction: Vec3) -> Vec3 {
-    if direction.y < 0.0 {
-        return Vec3::splat(0.12);
-    }
+/// Overcast, but bright around the zenith, where the sun stands behind thin clouds.
+fn bright_above(direction: Vec3) -> Vec3 {
     let from_zenith = direction.y.clamp(-1.0, 1.0).acos().to_degrees();
     let glow = 30.0 * (-(from_zenith / 14.0) * (from_zenith / 14.0)).exp();
-    vec3(0.9, 0.97, 1.1) * (1.0 + 2.0 * direction.y) / 3.0 + vec3(1.0, 0.95, 0.85) * glow
+    overcast(direction) + vec3(1.0, 0.95, 0.85) * glow
 }
 
 /// A flat piece between four corners.

@@ -2,7 +2,7 @@
 
 use core::f32::consts::PI;
 
-use glam::{Vec2, Vec3, Vec4, vec2, vec3};
+use glam::{Vec2, Vec3, vec2, vec3};
 
 use crate::render::{Bitmap, Image, Material, Mesh, Model, Sky, direction_of};
 
@@ -69,11 +69,10 @@ pub(crate) fn painted_sky(radiance: impl Fn(Vec3) -> Vec3) -> Sky {
     Sky::new(image)
 }
 
-/// A board of squares in two colours.
-pub(crate) fn checkered(squares: f32, a: Vec3, b: Vec3) -> Bitmap {
-    Bitmap::draw(256, 256, |uv| {
-        let square = (uv * squares).floor();
-        let color = if (square.x + square.y) as i32 % 2 == 0 { a } else { b };
-        Vec4::from((color, 1.0))
-    })
+/// An overcast sky (CIE), above a dark ground.
+pub(crate) fn overcast(direction: Vec3) -> Vec3 {
+    if direction.y < 0.0 {
+        return Vec3::splat(0.12);
+    }
+    vec3(0.9, 0.97, 1.1) * (1.0 + 2.0 * direction.y) / 3.0
 }
