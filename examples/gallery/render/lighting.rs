@@ -14,7 +14,7 @@ use super::bsdf::Bsdf;
 use super::material::{Lobe, Material};
 use super::model::Model;
 use super::scene::Point;
-use super::sky::{LUMINANCE, Sky};
+use super::sky::LUMINANCE;
 
 /// A direction worth tracing.
 pub(crate) struct Proposal {
@@ -54,7 +54,7 @@ impl Lights {
             .map(|(i, mesh)| clear(model, &model.materials[mesh.material]).times(factor(i)))
             .collect();
         let mut builder = LightSampler::builder();
-        builder.illumination(illumination).environment(environment(model.sky.as_deref())?);
+        builder.illumination(illumination).environment(environment(model)?);
         for (mesh, weight) in emitters.iter().zip(&emission) {
             let mesh_light = Mesh::emitter(&mesh.positions, &mesh.indices).uvs(&mesh.uvs);
             weight.add(&mut builder, mesh_light.sides(sides(&model.materials[mesh.material])))?;
@@ -207,9 +207,13 @@ fn surface(position: Vec3, bsdf: &Bsdf) -> ShadingPoint {
 }
 
 /// One number a texel guides well enough; the radiance itself is looked up in RGB, interpolated in the same way.
-fn environment(sky: Option<&Sky>) -> Result<Environment, Error> {
-    let Some(sky) = sky else { return Ok(Environment::constant(0.0)?) };
-    let environment = Environment::from_lat_long(sky.width(), sky.height(), &sky.luminance(), Filter::Bilinear)?;
+fn environment(model: &Model) -> Result<Environment, Error> {
+    let Some(sky) = &model.sky else { return Ok(Environment::constant(0.0)?) };
+    let (width, height, luminance, filter) = (sky.width(), sky.height(), sky.luminance(), Filter::Bilinear);
+    let environment = match model.guide_texels {
+        None => Environment::from_lat_long(width, height, &luminance, filter)?,
+        Some(size) => Environment::from_lat_long_with_size(width, height, &luminance, filter, size)?,
+    };
     Ok(environment.with_rotation(Environment::Y_UP_LAT_LONG)?)
 }
 

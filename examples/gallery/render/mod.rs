@@ -42,6 +42,7 @@ pub(crate) use model::{Fog, Model};
 pub(crate) use path::PathTracer;
 pub(crate) use progressive::{Budget, Progressive};
 pub(crate) use random::Random;
+pub(crate) use scene::Point;
 pub(crate) use sky::{LUMINANCE, Sky, direction_of};
 pub(crate) use technique::{LightChoice, Techniques};
 pub(crate) use texel_table::TexelTable;

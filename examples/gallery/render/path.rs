@@ -10,7 +10,7 @@ use super::lighting::{LightsAt, Proposal};
 use super::photon::{Photon, PhotonTracer};
 pub(crate) use super::random::Random;
 use super::scene::Point;
-use super::technique::{ChoiceAt, LightChoice, Techniques};
+use super::technique::{ChoiceAt, Techniques};
 use super::world::World;
 
 /// Estimates the radiance that arrives along a ray after being scattered, or, for no bounces at all, without.
@@ -112,7 +112,7 @@ impl<'a> PathTracer<'a> {
     fn by_light_samples(&self, x: &Vertex<'_>, random: &mut Random) -> Vec3 {
         let mut radiance = Vec3::ZERO;
         if self.world.has_sky()
-            && !matches!(self.techniques.choice, LightChoice::Single)
+            && self.techniques.samples_environment(&x.lights)
             && let Some(proposal) = self.techniques.lights.sample_environment(random.take())
         {
             radiance += self.along(x, &proposal, true);
@@ -187,8 +187,10 @@ impl<'a> PathTracer<'a> {
             return lights_pdf;
         }
         let environment_pdf = match from {
-            None => self.techniques.lights.environment_pdf(direction),
-            Some(_) => 0.0,
+            None if self.techniques.samples_environment(&x.lights) => {
+                self.techniques.lights.environment_pdf(direction)
+            }
+            _ => 0.0,
         };
         let photon_pdf = match (&self.photons, x.arrival, &x.place) {
             (Some(photons), Some(arrival), Place::Surface(point, _)) => photons.pdf(point, direction, from) / arrival,

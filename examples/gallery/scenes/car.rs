@@ -16,6 +16,7 @@ const GLASS: f32 = 0.006;
 pub(crate) fn car() -> Model {
     let camera = Camera::looking(vec3(0.12, 0.98, 0.95), vec3(-0.05, 0.72, -0.6), 70.0);
     let mut model = Model::new(camera, Some(painted_sky(bright_above)));
+    model.guide_texels = Some(64);
     let panes = panes();
 
     // Its two faces let through what one pane does.

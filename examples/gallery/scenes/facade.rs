@@ -2,10 +2,17 @@
 
 use glam::{Vec3, vec2, vec3};
 
-use super::shapes::{card, star_mask, walls};
+use super::shapes::{card, overcast, painted_sky, star_mask, walls};
 use crate::render::{Camera, Material, Model, Sky};
 
 const SIZE: Vec3 = vec3(30.0, 15.0, 20.0);
+
+/// The hall below clouds.
+pub(crate) fn overcast_facade(rows: u32) -> Model {
+    let mut model = facade(rows, painted_sky(overcast));
+    model.guide_texels = Some(64);
+    model
+}
 
 /// The hall with so many rows and columns of windows, each half as wide and half as high as their pitch.
 pub(crate) fn facade(rows: u32, sky: Sky) -> Model {

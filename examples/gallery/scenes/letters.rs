@@ -7,7 +7,7 @@ use super::shapes::{rectangle, wall_at};
 use crate::render::{Bitmap, Camera, Daylight, Material, Model};
 
 /// The card with the letters, as (y, z).
-const CARD: [Vec2; 2] = [vec2(1.0, 0.4), vec2(1.9, 5.6)];
+const CARD: [Vec2; 2] = [vec2(1.0, 1.6), vec2(1.5, 4.4)];
 
 pub(crate) fn letters() -> Model {
     let camera = Camera::looking(vec3(4.6, 2.6, 3.0), vec3(1.4, 0.3, 3.0), 60.0);

@@ -12,12 +12,11 @@ mod pinhole;
 mod room;
 mod shapes;
 
-pub(crate) use facade::facade;
+pub(crate) use facade::{facade, overcast_facade};
 pub(crate) use glyphs::is_ink;
 pub(crate) use letters::letters;
 pub(crate) use neon::neon;
 pub(crate) use nested::nested;
-pub(crate) use shapes::{overcast, painted_sky};
 
 use crate::render::Model;
 
@@ -40,7 +39,7 @@ pub(crate) const ALL: [Scene; 9] = [
     Scene { name: "lantern", model: lantern::lantern, bounces: &[4], detail: [0.3, 0.75] },
     Scene { name: "letters", model: letters, bounces: &[1], detail: [0.5, 0.5] },
     Scene { name: "pinhole", model: pinhole::pinhole, bounces: &[1], detail: [0.5, 0.5] },
-    Scene { name: "facade", model: || facade(100, painted_sky(overcast)), bounces: &[1, 3], detail: [0.4, 0.8] },
+    Scene { name: "facade", model: || overcast_facade(100), bounces: &[1, 3], detail: [0.4, 0.8] },
     Scene { name: "nested", model: nested, bounces: &[1], detail: [0.6, 0.7] },
     Scene { name: "neon", model: neon, bounces: &[1], detail: [0.35, 0.85] },
     Scene { name: "fog", model: fog::fog, bounces: &[2], detail: [0.5, 0.5] },

@@ -12,18 +12,18 @@ use crate::render::{Bitmap, Camera, Lobe, Material, Model};
 const TEXELS: [usize; 2] = [784, 144];
 
 pub(crate) fn neon() -> Model {
-    let camera = Camera::looking(vec3(0.0, 1.6, 3.4), vec3(0.0, 0.55, 0.0), 55.0);
+    let camera = Camera::looking(vec3(0.0, 1.9, 2.9), vec3(0.0, 0.2, 0.1), 52.0);
     let mut model = Model::new(camera, None);
     let sign = model.bitmap(Bitmap::draw(TEXELS[0], TEXELS[1], sign));
     let mut wall = model.material(Material {
         emission_map: Some(sign),
         color: Vec3::splat(0.05),
-        ..Material::emitter("wall of light", Vec3::splat(80.0))
+        ..Material::emitter("wall of light", Vec3::splat(120.0))
     });
     // Faces +z, towards the camera.
-    wall.grid([32, 1], |at| {
-        let (sin, cos) = (0.7 * PI * (at.x - 0.5)).sin_cos();
-        vec3(2.4 * sin, 0.35 + 0.9 * (1.0 - at.y), 1.0 - 2.4 * cos)
+    wall.grid([14, 1], |at| {
+        let (sin, cos) = (0.9 * PI * (at.x - 0.5)).sin_cos();
+        vec3(2.2 * sin, 0.02 + 1.0 * (1.0 - at.y), 1.0 - 2.2 * cos)
     });
     model.add(wall.facing(vec3(0.0, 0.8, 1.0)));
     let floor = model.material(Material::new("floor", Vec3::splat(0.45)));
@@ -39,17 +39,20 @@ pub(crate) fn neon() -> Model {
     model
 }
 
-/// Thin strokes of letters in pink and a frame in blue, on a wall that is all but dark.
+/// Colour of all light: what is left of the noise is that of places, not of colours.
+const GLOW: Vec3 = vec3(1.0, 0.5, 0.42);
+
+/// Thin strokes of letters and two bands, on a wall that is all but dark.
 fn sign(uv: Vec2) -> Vec4 {
     let texel = 1.0 / vec2(TEXELS[0] as f32, TEXELS[1] as f32);
     let near = [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y].map(|step| is_ink("FANLIGHT", uv + 2.0 * step * texel));
     // The outline of each letter alone glows.
     let color = if is_ink("FANLIGHT", uv) && near.contains(&false) {
-        vec3(1.0, 0.25, 0.4)
+        GLOW
     } else if (uv.y - 0.06).abs() < texel.y || (uv.y - 0.94).abs() < texel.y {
-        vec3(0.45, 0.5, 1.0)
+        0.6 * GLOW
     } else {
-        Vec3::splat(0.001)
+        0.0005 * GLOW
     };
     Vec4::from((color, 1.0))
 }

@@ -8,7 +8,7 @@ use glam::{Vec3, vec3};
 use super::without_and_with;
 use crate::render::{Daylight, Error, Illumination, Lights, Model, Random};
 use crate::report::{Comparison, Effort};
-use crate::scenes::{facade, overcast, painted_sky};
+use crate::scenes::{facade, overcast_facade};
 
 /// Points that are timed.
 const POINTS: u32 = 20_000;
@@ -17,9 +17,9 @@ pub(super) fn study(model: &Model, effort: Effort) -> Result<Comparison, Error> 
     println!("\nµs for a direction and its density from a point of the floor, on one thread:");
     println!("{:12} {:>12} {:>12}", "windows", "overcast", "sun");
     for rows in [1, 10, 100] {
-        let overcast = microseconds(&facade(rows, painted_sky(overcast)))?;
+        let clouds = microseconds(&overcast_facade(rows))?;
         let sun = microseconds(&facade(rows, Daylight::new().draw()))?;
-        println!("{:12} {overcast:>12.2} {sun:>12.2}", rows * rows);
+        println!("{:12} {clouds:>12.2} {sun:>12.2}", rows * rows);
     }
     let sunny = Model { camera: model.camera, ..facade(100, Daylight::new().draw()) };
     without_and_with("facade in the sun", &sunny, &[1], effort)?;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::emission::{Emitter, Source, Way};
 use super::without_and_with;
-use crate::render::{Error, Image, Model, Random, Reference, World};
+use crate::render::{Error, Image, Model, Point, Random, Reference, World};
 use crate::report::{Comparison, Effort};
 
 /// Photons of one picture.
@@ -19,13 +19,15 @@ const PIECE: u32 = 5_000;
 /// The floor, in metres along z and x, and its cells.
 const FLOOR: [f32; 2] = [6.0, 5.0];
 const CELLS: [usize; 2] = [192, 160];
+/// Height of the room.
+const CEILING: f32 = 3.0;
 
 pub(super) fn study(model: &Model, effort: Effort) -> Result<Comparison, Error> {
     let world = World::new(model);
     without_and_with("letters, paths", model, &[1], effort)?;
 
     println!("\nletters, {PHOTONS} photons");
-    println!("{:34} {:>9} {:>14} {:>12} {:>12} {:>10}", "", "through", "through / s", "flux", "relMSE", "gain");
+    println!("{:34} {:>9} {:>14} {:>12} {:>12} {:>10}", "", "through", "through / s", "flux", "error", "gain");
     let sources = [
         ("sky with sun", Source::Sky),
         ("sun", Source::Distant(vec3(-0.813_797_7, 0.5, 0.296_198_1))),
@@ -56,7 +58,7 @@ fn study_source(name: &str, emitter: &Emitter<'_>, world: &World, seed: u32) -> 
             100.0 * f64::from(fall.through) / f64::from(fall.photons),
             rate(fall),
             fall.flux(),
-            reference.rel_mse(&fall.image()),
+            error(&fall.image(), reference.image()),
             rate(fall) / rate(&unguided),
         );
     }
@@ -64,11 +66,18 @@ fn study_source(name: &str, emitter: &Emitter<'_>, world: &World, seed: u32) -> 
     Ok(Comparison { images: vec![unguided.image(), stratified.image()], reference, seen })
 }
 
+/// Squared error over the sum of squares: of the letters, and not of the dark around them.
+fn error(image: &Image, reference: &Image) -> f64 {
+    let squares = |image: &Image| image.pixels.iter().map(|pixel| f64::from(pixel.x).powi(2)).sum::<f64>();
+    let pixels = image.pixels.iter().zip(&reference.pixels).map(|(a, b)| a - b).collect();
+    squares(&Image { pixels, ..*image }) / squares(reference)
+}
+
 /// Where random numbers come from.
 #[derive(Clone, Copy)]
 enum Numbers {
     Independent,
-    /// Roberts' additive recurrence in five dimensions, shifted at random.
+    /// Sobol' sequence in five dimensions, shifted at random.
     Stratified,
 }
 
@@ -78,21 +87,42 @@ impl Numbers {
             Self::Independent => Random::new(u64::from(seed), u64::from(i)).take(),
             Self::Stratified => {
                 let shift: [f32; 5] = Random::new(u64::from(seed), 0).take();
-                // The root of x⁶ = x + 1.
-                const ROOT: f64 = 1.134_724_138_401_519_4;
+                // The best pair is for the place on the portal.
+                let dimensions = [2, 0, 1, 3, 4];
                 core::array::from_fn(|d| {
-                    let step = ROOT.powi(-(d as i32 + 1));
-                    ((f64::from(shift[d]) + step * f64::from(i)).fract() as f32).min(1.0 - f32::EPSILON)
+                    let bits = sobol(i, dimensions[d]) >> 8 ^ (shift[d] * (1 << 24) as f32) as u32;
+                    bits as f32 / (1 << 24) as f32
                 })
             }
         }
     }
 }
 
+/// One dimension of Sobol's sequence. Degrees, polynomials and first numbers are those of Joe and Kuo (2008).
+fn sobol(i: u32, dimension: usize) -> u32 {
+    const TABLE: [(usize, u32, [u32; 3]); 4] =
+        [(1, 0, [1, 0, 0]), (2, 1, [1, 3, 0]), (3, 1, [1, 3, 1]), (3, 2, [1, 1, 1])];
+    let Some((degree, polynomial, first)) = dimension.checked_sub(1).map(|row| TABLE[row]) else {
+        return i.reverse_bits();
+    };
+    let mut directions = [0_u32; 32];
+    for k in 0..32 {
+        directions[k] = if k < degree {
+            first[k] << (31 - k)
+        } else {
+            let before = directions[k - degree];
+            (1..degree).filter(|j| polynomial >> (degree - 1 - j) & 1 == 1).fold(before ^ before >> degree, |bits, j| {
+                bits ^ directions[k - j]
+            })
+        };
+    }
+    (0..32).filter(|k| i >> k & 1 == 1).fold(0, |bits, k| bits ^ directions[k])
+}
+
 /// Photons that fell on the floor.
 struct Fall {
     photons: u32,
-    /// How many got there.
+    /// How many got through the letters.
     through: u32,
     seconds: f64,
     /// Power by cell.
@@ -108,8 +138,10 @@ impl Fall {
             .fold(nothing, |(mut through, mut power), piece| {
                 for i in PIECE * piece..photons.min(PIECE * (piece + 1)) {
                     let Some(photon) = emitter.photon(way, numbers.of(seed, i)) else { continue };
-                    if let Some(cell) = floor_cell(world, photon.origin, photon.direction) {
-                        through += 1;
+                    let start = photon.origin + 2.0 * world.scene.offset() * photon.direction;
+                    let Some(point) = world.trace(start, photon.direction).1 else { continue };
+                    through += u32::from(is_inside(&point));
+                    if let Some(cell) = floor_cell(&point) {
                         power[cell] += f64::from(photon.power);
                     }
                 }
@@ -136,10 +168,14 @@ impl Fall {
     }
 }
 
-/// The cell of the floor that a ray falls into, if it meets nothing else. The letters stand upright.
-fn floor_cell(world: &World, origin: Vec3, direction: Vec3) -> Option<usize> {
-    let start = origin + 2.0 * world.scene.offset() * direction;
-    let point = world.trace(start, direction).1?;
+/// Whether a photon that ended here has passed the wall with the letters.
+fn is_inside(point: &Point) -> bool {
+    let [z, x] = FLOOR;
+    point.position.cmpgt(Vec3::ZERO).all() && point.position.cmplt(vec3(x, CEILING, z)).all()
+}
+
+/// The cell of the floor that a point is in, as letters stand upright.
+fn floor_cell(point: &Point) -> Option<usize> {
     if point.normal.y < 0.9 || point.position.y > 0.01 {
         return None;
     }
