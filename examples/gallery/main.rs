@@ -80,8 +80,6 @@ fn render_file(path: &Path, arguments: &Arguments) -> Result<(), Error> {
         None => Daylight::new().draw(),
     };
     let mut model = gltf::read(path, &arguments.portal_prefix, sky)?;
-    // There may be openings that are not flagged.
-    model.closed = false;
     resize(&mut model, arguments);
     let comparison = studies::without_and_with("file", &model, &[arguments.bounces], effort(arguments))?;
     let picture = arguments.output.clone().unwrap_or_else(|| path.with_extension("png"));

@@ -30,8 +30,6 @@ pub(crate) struct Model {
     pub(crate) sky: Option<Arc<Sky>>,
     /// Texels a side of the sky's image that guides the sampling; as many as it has itself if there is no number.
     pub(crate) guide_texels: Option<usize>,
-    /// Whether the portals fill all openings, so that where they are sampled the sky need not be.
-    pub(crate) closed: bool,
     pub(crate) fog: Option<Fog>,
     /// Materials whose names start with this are portals.
     pub(crate) portal_prefix: String,
@@ -47,7 +45,6 @@ impl Model {
             camera,
             sky: sky.map(Arc::new),
             guide_texels: None,
-            closed: true,
             fog: None,
             portal_prefix: "window".to_owned(),
         }

@@ -112,7 +112,7 @@ impl<'a> PathTracer<'a> {
     fn by_light_samples(&self, x: &Vertex<'_>, random: &mut Random) -> Vec3 {
         let mut radiance = Vec3::ZERO;
         if self.world.has_sky()
-            && self.techniques.samples_environment(&x.lights)
+            && !matches!(x.lights, ChoiceAt::Single(_))
             && let Some(proposal) = self.techniques.lights.sample_environment(random.take())
         {
             radiance += self.along(x, &proposal, true);
@@ -187,10 +187,8 @@ impl<'a> PathTracer<'a> {
             return lights_pdf;
         }
         let environment_pdf = match from {
-            None if self.techniques.samples_environment(&x.lights) => {
-                self.techniques.lights.environment_pdf(direction)
-            }
-            _ => 0.0,
+            None => self.techniques.lights.environment_pdf(direction),
+            Some(_) => 0.0,
         };
         let photon_pdf = match (&self.photons, x.arrival, &x.place) {
             (Some(photons), Some(arrival), Place::Surface(point, _)) => photons.pdf(point, direction, from) / arrival,

@@ -24,8 +24,6 @@ pub(crate) enum LightChoice {
 pub(crate) struct Techniques {
     pub(crate) lights: Lights,
     guide: Option<Guide>,
-    /// Whether the sky is seen through portals alone.
-    closed: bool,
     pub(crate) choice: LightChoice,
     /// At how many vertices of a path points on lights are chosen.
     pub(crate) vertices: u32,
@@ -39,7 +37,7 @@ impl Techniques {
         let table = TexelTable::areas(model);
         let choice = if table.is_empty() { LightChoice::None } else { LightChoice::Table(table) };
         let lights = Lights::new(model, Illumination::default())?;
-        Ok(Self { lights, guide: None, closed: false, choice, vertices: u32::MAX, photons: false })
+        Ok(Self { lights, guide: None, choice, vertices: u32::MAX, photons: false })
     }
 
     /// The same with `fanlight`: at the point that the camera sees by choosing points on lights, at those behind it
@@ -47,14 +45,7 @@ impl Techniques {
     pub(crate) fn with(model: &Model) -> Result<Self, Error> {
         let lights = Lights::new(model, Illumination::default())?;
         let guide = Guide::new(model)?;
-        Ok(Self {
-            lights,
-            guide,
-            closed: model.closed,
-            choice: LightChoice::Fanlight,
-            vertices: 1,
-            photons: true,
-        })
+        Ok(Self { lights, guide, choice: LightChoice::Fanlight, vertices: 1, photons: true })
     }
 
     /// The same with another way to choose points on lights.
@@ -76,15 +67,6 @@ impl Techniques {
             LightChoice::Single => ChoiceAt::Single(self.lights.at_surface(point.position, bsdf)),
             LightChoice::Table(table) => ChoiceAt::Table(table, point.position),
             _ => ChoiceAt::None,
-        }
-    }
-
-    /// Whether the sky's bright parts are sampled where points on lights are chosen like this.
-    pub(crate) fn samples_environment(&self, lights: &ChoiceAt<'_>) -> bool {
-        match lights {
-            ChoiceAt::Single(_) => false,
-            ChoiceAt::Fanlight(_) => !self.closed,
-            _ => true,
         }
     }
 

@@ -104,12 +104,14 @@ fn add_body(model: &mut Model) {
 fn add_interior(model: &mut Model) {
     let mut seats = model.material(Material::new("leather", vec3(0.32, 0.16, 0.09)));
     for x in [-0.36, 0.36] {
-        seats = seats.block(vec3(x, 0.3, -0.05), vec3(0.5, 0.14, 0.5), 0.0);
-        seats = seats.block(vec3(x, 0.62, 0.2), vec3(0.48, 0.6, 0.12), 0.0);
-        seats = seats.block(vec3(x, 0.99, 0.22), vec3(0.24, 0.14, 0.08), 0.0);
+        cushion(&mut seats, vec3(x, 0.3, -0.05), vec3(0.5, 0.16, 0.54));
+        cushion(&mut seats, vec3(x, 0.62, 0.2), vec3(0.48, 0.66, 0.14));
+        cushion(&mut seats, vec3(x, 1.0, 0.22), vec3(0.24, 0.14, 0.09));
     }
-    seats = seats.block(vec3(0.0, 0.3, 0.95), vec3(1.3, 0.2, 0.5), 0.0);
+    cushion(&mut seats, vec3(0.0, 0.3, 0.95), vec3(1.3, 0.2, 0.5));
     model.add(seats);
+    let carpet = model.material(Material::new("carpet", vec3(0.2, 0.2, 0.24)));
+    model.add(tufted(carpet));
     let dash = model.material(Material::new("dashboard", vec3(0.12, 0.12, 0.13)));
     model.add(dash.block(vec3(0.0, 0.58, -1.0), vec3(1.46, 0.22, 0.45), 0.0));
     let mut wheel = model.material(Material::new("wheel", Vec3::splat(0.3)).lobe(Lobe::Glossy(30.0)));
@@ -120,4 +122,30 @@ fn add_interior(model: &mut Model) {
         vec3(-0.36, 0.72, -0.68) + glam::Mat3::from_rotation_x(-0.4) * flat
     });
     model.add(wheel);
+}
+
+/// A box with soft edges and a grain.
+fn cushion(mesh: &mut Mesh, center: Vec3, size: Vec3) {
+    let mut round = Mesh::of(0).sphere(Vec3::ZERO, 1.0, 96);
+    for position in &mut round.positions {
+        let soft = position.signum() * position.abs().powf(0.35);
+        let at = 90.0 * soft * size;
+        let grain = 0.002 * at.x.sin() * at.y.sin() * at.z.sin();
+        *position = center + 0.5 * soft * size + grain * *position;
+    }
+    mesh.append(&round);
+}
+
+/// Blades along the floor, in rows that sway.
+fn tufted(mut carpet: Mesh) -> Mesh {
+    const ROWS: u16 = 200;
+    for row in 0..ROWS {
+        for column in 0..ROWS {
+            let [x, z] = [column, row].map(|i| (f32::from(i) + 0.5) / f32::from(ROWS));
+            let (sin, cos) = (40.0 * x + 77.0 * z * x + 3.0 * f32::from(row % 7)).sin_cos();
+            let foot = vec3(1.46 * (x - 0.5), 0.0, 2.58 * z - 1.24);
+            carpet = carpet.quad(foot, 0.008 * vec3(cos, 0.0, sin), vec3(0.004 * sin, 0.02, 0.004 * cos));
+        }
+    }
+    carpet
 }

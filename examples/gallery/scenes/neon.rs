@@ -9,7 +9,7 @@ use super::glyphs::is_ink;
 use crate::render::{Bitmap, Camera, Lobe, Material, Model};
 
 /// Texels of the wall.
-const TEXELS: [usize; 2] = [784, 144];
+const TEXELS: [usize; 2] = [1568, 288];
 
 pub(crate) fn neon() -> Model {
     let camera = Camera::looking(vec3(0.0, 1.9, 2.9), vec3(0.0, 0.2, 0.1), 52.0);
@@ -18,7 +18,7 @@ pub(crate) fn neon() -> Model {
     let mut wall = model.material(Material {
         emission_map: Some(sign),
         color: Vec3::splat(0.05),
-        ..Material::emitter("wall of light", Vec3::splat(120.0))
+        ..Material::emitter("wall of light", Vec3::splat(600.0))
     });
     // Faces +z, towards the camera.
     wall.grid([14, 1], |at| {
@@ -42,17 +42,17 @@ pub(crate) fn neon() -> Model {
 /// Colour of all light: what is left of the noise is that of places, not of colours.
 const GLOW: Vec3 = vec3(1.0, 0.5, 0.42);
 
-/// Thin strokes of letters and two bands, on a wall that is all but dark.
+/// Thin strokes of letters and two bands, on a wall that is dark but for them.
 fn sign(uv: Vec2) -> Vec4 {
     let texel = 1.0 / vec2(TEXELS[0] as f32, TEXELS[1] as f32);
-    let near = [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y].map(|step| is_ink("FANLIGHT", uv + 2.0 * step * texel));
+    let near = [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y].map(|step| is_ink("FANLIGHT", uv + step * texel));
     // The outline of each letter alone glows.
     let color = if is_ink("FANLIGHT", uv) && near.contains(&false) {
         GLOW
     } else if (uv.y - 0.06).abs() < texel.y || (uv.y - 0.94).abs() < texel.y {
         0.6 * GLOW
     } else {
-        0.0005 * GLOW
+        Vec3::ZERO
     };
     Vec4::from((color, 1.0))
 }

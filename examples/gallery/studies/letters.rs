@@ -111,9 +111,9 @@ fn sobol(i: u32, dimension: usize) -> u32 {
             first[k] << (31 - k)
         } else {
             let before = directions[k - degree];
-            (1..degree).filter(|j| polynomial >> (degree - 1 - j) & 1 == 1).fold(before ^ before >> degree, |bits, j| {
-                bits ^ directions[k - j]
-            })
+            (1..degree)
+                .filter(|j| polynomial >> (degree - 1 - j) & 1 == 1)
+                .fold(before ^ before >> degree, |bits, j| bits ^ directions[k - j])
         };
     }
     (0..32).filter(|k| i >> k & 1 == 1).fold(0, |bits, k| bits ^ directions[k])
