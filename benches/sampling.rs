@@ -5,7 +5,7 @@
 
 use core::hint::black_box;
 
-use criterion::Criterion;
+use criterion::{BenchmarkId, Criterion, Throughput};
 use fanlight::{Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight};
 use glam::{DVec3, Vec3};
 
@@ -107,6 +107,20 @@ fn lights(criterion: &mut Criterion) {
         let sampler = build(&cloud);
         let mut group = criterion.benchmark_group(format!("cloud-{n}"));
         group.bench_function("sample", |b| in_circle(b, POINTS, |i| sampler.sample(&points[i], numbers[i])));
+
+        let queries: Vec<_> = points.iter().copied().zip(numbers.iter().copied()).collect();
+        for size in [1, 2, 4, 8, 16] {
+            let mut samples = [None; 16];
+            let mut batches = queries.chunks_exact(size).cycle();
+            group.throughput(Throughput::Elements(size as u64));
+            group.bench_function(BenchmarkId::new("sample_many", size), |b| {
+                b.iter(|| {
+                    sampler.sample_many(batches.next().unwrap_or_default(), &mut samples);
+                    samples
+                });
+            });
+        }
+        group.throughput(Throughput::Elements(1));
 
         // Densities of what was drawn: elsewhere they would be cheap zeros.
         let drawn: Vec<(ShadingPoint, Hit, Vec3)> = points

@@ -38,6 +38,7 @@
 //!    build. Everything is checked here: what a builder accepted can always be sampled.
 //! 2. At a [`ShadingPoint`], call [`sample`](LightSampler::sample) with three random numbers and trace a ray. `None`
 //!    is a sample of zero.
+//!    With more than one question about a point, ask [`at`](LightSampler::at) it first.
 //! 3. Divide by the density that belongs to what was evaluated:
 //!
 //! | what the ray brings back | density |

@@ -1,6 +1,6 @@
 //! The same code compiled for wider vector registers, chosen when the program runs.
 //!
-//! Nothing here computes. A [`Work`] is plain code over arrays, which a compiler turns into vectors of the width that
+//! A [`Work`] is plain code over arrays, which a compiler turns into vectors of the width that
 //! it may use; products and sums are never fused, so the results are the same bits at every level.
 
 /// Code that is worth compiling for each level.
@@ -102,6 +102,20 @@ fn with_avx2<W: Work>(work: W) -> W::Output {
 #[target_feature(enable = "avx2,avx512f,avx512vl")]
 fn with_avx512<W: Work>(work: W) -> W::Output {
     work.run()
+}
+
+/// Asks for a value's cache lines, so that a later look at it does not wait for all of them.
+#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "a hint that reads nothing"))]
+pub(crate) fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    for offset in (0..size_of::<T>()).step_by(64).chain([size_of::<T>() - 1]) {
+        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: the address is inside of the value, and all machines of this kind have the instruction.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(core::ptr::from_ref(value).cast::<i8>().add(offset)) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
 }
 
 /// The machine's square root, for builds without `std`.

@@ -72,12 +72,14 @@ pub(crate) enum Part {
     Splitting,
     /// Glossy receivers.
     Lobes,
+    /// The terms that can guide the descent inside a triangle.
+    Terms,
     /// Error against time of rendered images.
     Room,
 }
 
 impl Part {
-    const ALL: [Self; 5] = [Self::Table, Self::Stratification, Self::Splitting, Self::Lobes, Self::Room];
+    const ALL: [Self; 6] = [Self::Table, Self::Stratification, Self::Splitting, Self::Lobes, Self::Terms, Self::Room];
 }
 
 /// What the user asks for.
@@ -95,7 +97,7 @@ pub(crate) struct Args {
 
 const USAGE: &str = "cargo bench --bench quality -- [--quick] [--json FILE] [--plots DIR] [--workload W]... \
                      [--method M]... [--points N] [--samples N] \
-                     [--table] [--stratification] [--splitting] [--lobes] [--room] [--everything]";
+                     [--table] [--stratification] [--splitting] [--lobes] [--terms] [--room] [--everything]";
 
 impl Args {
     /// Reads the command line; ignores what cargo adds.
@@ -122,6 +124,7 @@ impl Args {
                 "--stratification" => args.parts.push(Part::Stratification),
                 "--splitting" => args.parts.push(Part::Splitting),
                 "--lobes" => args.parts.push(Part::Lobes),
+                "--terms" => args.parts.push(Part::Terms),
                 "--room" => args.parts.push(Part::Room),
                 "--everything" => args.parts = Part::ALL.to_vec(),
                 _ => return Err(format!("unknown argument {word}\n{USAGE}")),

@@ -108,10 +108,13 @@ impl Results {
             workload: String::new(),
             method: String::new(),
             class,
-            relvar: relvar.map(|(summary, _)| summary),
+            relvar: relvar.map(|(summary, ..)| summary),
             selection: selection.map(|(summary, _)| summary),
-            lost: selection.map(|(_, lost)| lost),
-            zero_rate: relvar.map(|(_, zeros)| zeros),
+            lost: [relvar.map(|(.., lost)| lost), selection.map(|(_, lost)| lost)]
+                .into_iter()
+                .flatten()
+                .reduce(f64::max),
+            zero_rate: relvar.map(|(_, zeros, _)| zeros),
             nanoseconds: timing::Nanoseconds { sample: 0.0, pdf: 0.0 },
             bytes: 0,
             build_ms: 0.0,

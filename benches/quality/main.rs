@@ -1,7 +1,7 @@
 //! How noisy, how fast and how large the crate's sampling is, next to other methods on the same workloads.
 //!
 //! `cargo bench --bench quality` prints one row for each workload, method and class of shading points; `-- --quick`
-//! takes less than a minute. `-- --stratification`, `--splitting`, `--lobes` and `--room` run a study instead, and
+//! takes less than a minute. `-- --stratification`, `--splitting`, `--lobes`, `--terms` and `--room` run a study instead, and
 //! `--everything` all of them after the table.
 //!
 //! Some workloads can be handed to a method in two ways: openings as holes or as a clip map, a clip map that is read
@@ -47,6 +47,7 @@ fn run(args: &Args) -> Result<(), Failure> {
             Part::Splitting => studies::splitting::run(args),
             Part::Lobes => studies::lobes::run(args),
             Part::Room => studies::room::run(args)?,
+            Part::Terms => studies::terms::run(&args.effort),
         }
     }
     Ok(())

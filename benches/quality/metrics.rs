@@ -57,11 +57,12 @@ pub(crate) fn summary(variances: impl Iterator<Item = (f64, f64)>) -> Option<Sum
     Some(Summary { median: at(0.5)?, p90: at(0.9)?, energy_weighted: variance_sum / e2_sum })
 }
 
-/// Summary of measurements, and their mean rate of zeros.
-pub(crate) fn summarise(points: &[Measured], wanted: impl Fn(Class) -> bool) -> Option<(Summary, f64)> {
+/// Summary of measurements, their mean rate of zeros, and the largest share that is lost.
+pub(crate) fn summarise(points: &[Measured], wanted: impl Fn(Class) -> bool) -> Option<(Summary, f64, f64)> {
     let points: Vec<&Measured> = points.iter().filter(|point| wanted(point.class)).collect();
     let zeros = points.iter().map(|point| point.zeros).sum::<f64>() / points.len() as f64;
-    summary(points.iter().map(|point| (point.variance, point.e2))).map(|summary| (summary, zeros))
+    let lost = points.iter().fold(0.0, |most: f64, point| most.max(point.lost));
+    summary(points.iter().map(|point| (point.variance, point.e2))).map(|summary| (summary, zeros, lost))
 }
 
 /// Summary of selections, and the largest share that is lost.

@@ -13,7 +13,7 @@ pub(crate) struct Row {
     pub(crate) class: &'static str,
     pub(crate) relvar: Option<Summary>,
     pub(crate) selection: Option<Summary>,
-    /// Largest share of a point's irradiance that comes from triangles of probability zero.
+    /// Largest share of a point's light that has a probability of zero, by triangles or by samples of a reference.
     pub(crate) lost: Option<f64>,
     pub(crate) zero_rate: Option<f64>,
     pub(crate) nanoseconds: Nanoseconds,
@@ -87,7 +87,7 @@ pub(crate) fn print(row: &Row) {
     );
 }
 
-/// Fails if the crate gives a light that sends something a probability of zero.
+/// Fails if the crate gives anything that sends light a probability of zero.
 pub(crate) fn check_nothing_is_lost(rows: &[Row]) -> Result<(), Box<dyn core::error::Error>> {
     let loses = |row: &&Row| row.method.starts_with("fanlight") && row.lost.is_some_and(|lost| lost > 0.0);
     match rows.iter().find(loses) {

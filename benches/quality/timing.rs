@@ -66,7 +66,7 @@ fn nanoseconds<T>(inputs: &[T], call: impl FnMut(&T)) -> f64 {
     start.elapsed().as_secs_f64() * 1e9 / inputs.len() as f64
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }

@@ -24,6 +24,8 @@ pub(crate) struct Measured {
     pub(crate) variance: f64,
     /// Share of samples that carry nothing.
     pub(crate) zeros: f64,
+    /// Share of the reference's samples that carry something and that the method cannot draw.
+    pub(crate) lost: f64,
 }
 
 /// A method at work on a scene.
@@ -46,16 +48,15 @@ impl Estimator<'_> {
     /// Measures at a point whose irradiance is positive.
     pub(crate) fn measure(&self, x: &ShadingPoint, truth: &Truth, samples: usize, seed: u64) -> Measured {
         let mut pcg = Pcg32::new(seed, 5);
-        let (rest, zeros) = match self.reference(truth) {
-            Some(reference) => self.mixture(&reference, x, truth.total, samples, &mut pcg),
-            None => self.plain(x, truth.total, samples, &mut pcg),
+        let measured = match self.reference(truth) {
+            Some(reference) => self.mixture(&reference, x, truth, samples, &mut pcg),
+            None => self.plain(x, truth, samples, &mut pcg),
         };
         let sun = match (&self.scene.sky, truth.class) {
             (Some(sky), Class::Sun) if !self.method.has_own_environment() => self.sun(sky, x, truth.total),
             _ => 0.0,
         };
-        let variance = rest + sun;
-        Measured { class: truth.class, e2: truth.total * truth.total, variance, zeros }
+        Measured { variance: measured.variance + sun, ..measured }
     }
 
     fn reference<'t>(&'t self, truth: &'t Truth) -> Option<Reference<'t>> {
@@ -67,16 +68,20 @@ impl Estimator<'_> {
         self.openings.map(Reference::Openings).or_else(|| is_plain.then(lights))
     }
 
-    /// Plain Monte Carlo with the method's own samples.
-    fn plain(&self, x: &ShadingPoint, irradiance: f64, samples: usize, pcg: &mut Pcg32) -> (f64, f64) {
-        let (mut squares, mut zeros) = (0.0, 0.0);
+    /// Plain Monte Carlo with the method's own samples. The irradiance of a method with an environment of its own is
+    /// that of its environment.
+    fn plain(&self, x: &ShadingPoint, truth: &Truth, samples: usize, pcg: &mut Pcg32) -> Measured {
+        let (mut sum, mut squares, mut zeros) = (0.0, 0.0, 0.0);
         for _ in 0..samples {
             let drawn = self.method.sample(x, pcg.uniform3());
             let estimate = drawn.map_or(0.0, |drawn| contribution(self.scene, x, &drawn) / drawn.pdf);
             zeros += f64::from(u8::from(estimate == 0.0));
-            squares += (estimate - irradiance).powi(2);
+            sum += estimate - truth.total;
+            squares += (estimate - truth.total).powi(2);
         }
-        (squares / samples as f64, zeros / samples as f64)
+        let [bias, square, zeros] = [sum, squares, zeros].map(|sum| sum / samples as f64);
+        let variance = if self.method.has_own_environment() { square - bias * bias } else { square };
+        Measured { class: truth.class, e2: truth.total * truth.total, variance, zeros, lost: 0.0 }
     }
 
     /// Without the sun: the integral of `(f/p - E)² p`, half of its samples from the method and half from the
@@ -85,17 +90,18 @@ impl Estimator<'_> {
         &self,
         reference: &Reference<'_>,
         x: &ShadingPoint,
-        irradiance: f64,
+        truth: &Truth,
         samples: usize,
         pcg: &mut Pcg32,
-    ) -> (f64, f64) {
-        let half = samples.div_ceil(2);
-        let (mut sum, mut zeros) = (0.0, 0.0);
+    ) -> Measured {
+        let (half, irradiance) = (samples.div_ceil(2), truth.total);
+        let (mut sum, mut zeros, mut lost) = (0.0, 0.0, 0.0);
         let mut add = |drawn: &Drawn, p: f64, r: f64| {
             let f = contribution(self.scene, x, drawn);
             if p > 0.0 && !(f > 0.0 && self.is_sun(drawn)) {
                 sum += (f / p - irradiance).powi(2) * p / (p + r);
             }
+            lost += f64::from(u8::from(f > 0.0 && !(p > 0.0)));
             f
         };
         let mut missed = 0.0;
@@ -111,8 +117,9 @@ impl Estimator<'_> {
                 add(&drawn, self.method.pdf(x, &drawn), drawn.pdf);
             }
         }
-        let count = half as f64;
-        ((sum + missed * irradiance * irradiance) / count, (zeros + missed) / count)
+        let e2 = irradiance * irradiance;
+        let [variance, zeros, lost] = [sum + missed * e2, zeros + missed, lost].map(|sum| sum / half as f64);
+        Measured { class: truth.class, e2, variance, zeros, lost }
     }
 
     fn is_sun(&self, drawn: &Drawn) -> bool {

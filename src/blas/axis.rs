@@ -34,16 +34,6 @@ impl Stretch {
             PlaceOnAxis::Held(lo, hi) => [lo, hi],
         }
     }
-
-    /// The texel that is held here: beyond the edge of a clamped image, or all that an axis has.
-    pub(crate) fn held_texel(&self) -> Option<u32> {
-        (matches!(self.place, PlaceOnAxis::Held(..)) && self.first == self.last).then_some(self.first)
-    }
-
-    /// Whether this stands for the whole axis, any number of periods of it.
-    pub(crate) fn is_all_periods(&self) -> bool {
-        matches!(self.place, PlaceOnAxis::Held(..)) && self.first != self.last
-    }
 }
 
 /// More copies of the image than this are not told apart.

@@ -108,7 +108,7 @@ pub(crate) struct Place {
 
 /// The inverse of the numbering. `index` is below `M`.
 #[inline]
-pub(crate) fn place<const M: usize>(index: usize) -> Place {
+pub(crate) const fn place<const M: usize>(index: usize) -> Place {
     let r = edge_cells::<M>();
     debug_assert!(index < M);
     let index = index as u32;
@@ -116,7 +116,7 @@ pub(crate) fn place<const M: usize>(index: usize) -> Place {
     let column = index - row * row;
     let a2 = column / 2;
     let inverted = column % 2 == 1;
-    Place { a: [r - 1 - row, row - a2 - u32::from(inverted), a2], inverted }
+    Place { a: [r - 1 - row, row - a2 - column % 2, a2], inverted }
 }
 
 /// A cell of any depth: how its own coordinates map to those of the whole triangle.

@@ -36,19 +36,73 @@ impl Cell {
         Self { domain: self.domain.child::<M>(index), vertices: [corner(0), corner(1), corner(2)] }
     }
 
-    /// Centroid relative to the shading point.
-    #[inline]
-    pub(crate) fn center(&self) -> Vec3 {
-        let [a, b, c] = self.vertices;
-        (a + b + c) * (1.0 / 3.0)
-    }
-
     /// Share of the whole triangle's area.
     #[inline]
     pub(crate) fn share(&self) -> f32 {
         let edge = self.domain.size as f32 / barycentric::LATTICE as f32;
         edge * edge
     }
+}
+
+/// Where the parts of a cell lie, side by side: weights of the cell's own corners.
+struct Weights<const M: usize> {
+    /// By corner of the part, then by corner of the cell.
+    corners: [[[f32; M]; 3]; 3],
+    /// The centroid's, by corner of the cell.
+    center: [[f32; M]; 3],
+}
+
+impl<const M: usize> Weights<M> {
+    const TABLE: Self = Self::new();
+
+    const fn new() -> Self {
+        let step = 1.0 / barycentric::edge_cells::<M>() as f32;
+        let mut weights = Self { corners: [[[0.0; M]; 3]; 3], center: [[0.0; M]; 3] };
+        let mut index = 0;
+        while index < M {
+            let Place { a, inverted } = barycentric::place::<M>(index);
+            let mut i = 0;
+            while i < 3 {
+                let mut k = 0;
+                while k < 3 {
+                    let toward = (i == k) as u32;
+                    let along = if inverted { a[i] + 1 - toward } else { a[i] + toward };
+                    weights.corners[k][i][index] = along as f32 * step;
+                    weights.center[i][index] += along as f32 * step * (1.0 / 3.0);
+                    k += 1;
+                }
+                i += 1;
+            }
+            index += 1;
+        }
+        weights
+    }
+}
+
+/// The barycentrics of the parts' centroids, by corner of the cell.
+#[inline(always)]
+pub(crate) fn center_weights<const M: usize>() -> &'static [[f32; M]; 3] {
+    &Weights::<M>::TABLE.center
+}
+
+/// Interpolates between three values.
+#[inline(always)]
+fn interpolate<const M: usize>(weights: &[[f32; M]; 3], [x, y, z]: [f32; 3]) -> [f32; M] {
+    core::array::from_fn(|i| weights[0][i] * x + weights[1][i] * y + weights[2][i] * z)
+}
+
+/// A linear function at the corners of the parts of a cell, by corner, from its values at the cell's corners.
+#[inline(always)]
+pub(crate) fn at_corners<const M: usize>(values: [f32; 3]) -> [[f32; M]; 3] {
+    let [a, b, c] = &Weights::<M>::TABLE.corners;
+    [interpolate(a, values), interpolate(b, values), interpolate(c, values)]
+}
+
+/// Centroids of the parts of a cell, by coordinate.
+#[inline(always)]
+pub(crate) fn centers<const M: usize>([a, b, c]: &[Vec3; 3]) -> [[f32; M]; 3] {
+    let center = &Weights::<M>::TABLE.center;
+    [interpolate(center, [a.x, b.x, c.x]), interpolate(center, [a.y, b.y, c.y]), interpolate(center, [a.z, b.z, c.z])]
 }
 
 #[cfg(test)]

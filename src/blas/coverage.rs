@@ -1,11 +1,9 @@
 //! The average of a texture over a footprint.
 
-use smallvec::SmallVec;
-
-use crate::blas::axis::{Stretch, stretches};
 use crate::blas::footprint::Footprint;
 use crate::blas::polygon::Polygon;
 use crate::blas::pyramid::Prepared;
+use crate::blas::texture::wrap_index;
 use crate::blas::touched::Range;
 use crate::math::floor64;
 use crate::record::Filter;
@@ -22,8 +20,8 @@ const FLOOR: f64 = 1e-6;
 /// out of its budget.
 const EXACT_TEXELS: f64 = 48.0;
 
-/// Larger ones are integrated over a level of the pyramid that has up to this many blocks to a side.
-const BLOCKS: f64 = 8.0;
+/// Larger ones are looked up in so many cells along an edge.
+const SUBDIVISION: u32 = 8;
 
 /// A triangle is taken for a line when its area is this share of its longest edge's square.
 const LINE: f64 = 1e-9;
@@ -119,104 +117,44 @@ fn bilinear(prepared: &Prepared<'_>, footprint: &Footprint) -> f64 {
     sum / total
 }
 
-/// The mean of look-ups at the centres of 64 cells, for footprints without area: a point or a line.
+/// The mean of look-ups at the centres of cells, in a level of the pyramid whose blocks are about as large as these
+/// cells. Ignores the half texel that bilinear look-up blurs a block's edge by.
+fn blocks(prepared: &Prepared<'_>, footprint: &Footprint) -> f64 {
+    let texture = prepared.texture();
+    let (size, wrap) = (texture.size(), texture.wrapping());
+    let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
+    let mut level = 0;
+    while level < prepared.top() && span > f64::from(SUBDIVISION << level) {
+        level += 1;
+    }
+    mean_of_centres(footprint, |[x, y]| {
+        let texel = |at: f64, k: usize| wrap_index(wrap[k], footprint.origin[k] + floor64(at) as i64, size[k]);
+        f64::from(prepared.block(level, texel(x, 0) >> level, texel(y, 1) >> level).mean)
+    })
+}
+
+/// The mean of look-ups, for footprints without area: a point or a line.
 fn looked_up(prepared: &Prepared<'_>, footprint: &Footprint) -> f64 {
+    let [x0, y0] = footprint.origin.map(|origin| origin as f64);
+    mean_of_centres(footprint, |[x, y]| prepared.texture().value_at(x0 + x, y0 + y))
+}
+
+/// Mean over the centres of the cells of a regular subdivision.
+fn mean_of_centres(footprint: &Footprint, value: impl Fn([f64; 2]) -> f64) -> f64 {
     let [a, b, c] = footprint.corners;
     let mut sum = 0.0;
-    let mut count = 0.0;
-    for i in 0..8 {
-        for j in 0..8 - i {
-            for third in [1.0, 2.0] {
-                if third == 2.0 && i + j == 7 {
+    for i in 0..SUBDIVISION {
+        for j in 0..SUBDIVISION - i {
+            for third in 1..=2 {
+                if third == 2 && i + j == SUBDIVISION - 1 {
                     continue;
                 }
-                let (b1, b2) = ((f64::from(i) + third / 3.0) / 8.0, (f64::from(j) + third / 3.0) / 8.0);
-                let at = |k: usize| a[k] + b1 * (b[k] - a[k]) + b2 * (c[k] - a[k]) + footprint.origin[k] as f64;
-                sum += prepared.texture().value_at(at(0), at(1));
-                count += 1.0;
+                let [b1, b2] = [i, j].map(|i| f64::from(3 * i + third) / f64::from(3 * SUBDIVISION));
+                sum += value([0, 1].map(|k| a[k] + b1 * (b[k] - a[k]) + b2 * (c[k] - a[k])));
             }
         }
     }
-    sum / count
-}
-
-/// A block of the pyramid along one axis, and what it covers.
-struct Piece {
-    block: u32,
-    /// Texels of the block that count.
-    texels: [u32; 2],
-    /// Set if a single texel holds for the whole piece.
-    held: Option<u32>,
-    interval: [f64; 2],
-}
-
-/// The integral over a level of the pyramid as if its blocks were texels. Ignores the half texel that bilinear
-/// look-up blurs a block's edge by. A footprint over many copies of the image becomes its box.
-fn blocks(prepared: &Prepared<'_>, footprint: &Footprint) -> f64 {
-    let texture = prepared.texture();
-    let size = texture.size();
-    let columns_and_rows: [SmallVec<[Stretch; 4]>; 2] = core::array::from_fn(|k| {
-        let from = footprint.origin[k] + floor64(footprint.lo[k]) as i64;
-        let to = footprint.origin[k] + floor64(footprint.hi[k]) as i64;
-        stretches(texture.wrapping()[k], size[k], from, to, footprint.origin[k])
-    });
-    let span: [f64; 2] = core::array::from_fn(|k| (footprint.hi[k] - footprint.lo[k]).min(4.0 * f64::from(size[k])));
-    let mut level = 0;
-    while level < prepared.top() && span[0].max(span[1]) > BLOCKS * f64::from(1 << level) {
-        level += 1;
-    }
-    let as_box = columns_and_rows.iter().flatten().any(Stretch::is_all_periods);
-    let [columns, rows] = [0, 1].map(|k| pieces(&columns_and_rows[k], level, [footprint.lo[k], footprint.hi[k]]));
-    let polygon = Polygon::triangle(footprint.corners);
-    let (mut sum, mut total) = (0.0, 0.0);
-    for row in &rows {
-        let [y0, y1] = row.interval;
-        let strip = if as_box { polygon } else { polygon.clip(1, y0, y1) };
-        for column in &columns {
-            let [x0, x1] = column.interval;
-            let area = if as_box { (x1 - x0) * (y1 - y0) } else { strip.clip(0, x0, x1).area() };
-            sum += area * mean(prepared, level, column, row);
-            total += area;
-        }
-    }
-    sum / total
-}
-
-/// The mean over a block. Beyond a clamped edge, that over up to eight texels of the edge.
-fn mean(prepared: &Prepared<'_>, level: u32, column: &Piece, row: &Piece) -> f64 {
-    let texel = |x: u32, y: u32| f64::from(prepared.texture().texel(x, y));
-    let along = |[first, last]: [u32; 2], at: &dyn Fn(u32) -> f64| {
-        let count = (last - first + 1).min(8);
-        let texel = |i: u32| first + (2 * i + 1) * (last - first + 1) / (2 * count);
-        (0..count).map(|i| at(texel(i))).sum::<f64>() / f64::from(count)
-    };
-    match (column.held, row.held) {
-        (None, None) => f64::from(prepared.block(level, column.block, row.block).mean),
-        (Some(x), None) => along(row.texels, &|y| texel(x, y)),
-        (None, Some(y)) => along(column.texels, &|x| texel(x, y)),
-        (Some(x), Some(y)) => texel(x, y),
-    }
-}
-
-fn pieces(stretches: &[Stretch], level: u32, span: [f64; 2]) -> SmallVec<[Piece; 24]> {
-    let mut out = SmallVec::new();
-    for stretch in stretches {
-        for block in stretch.first >> level..=stretch.last >> level {
-            let first = stretch.first.max(block << level);
-            let last = stretch.last.min((block << level) + ((1 << level) - 1));
-            let interval = if stretch.is_all_periods() {
-                // Only the share of each block counts.
-                [0.0, f64::from(last - first + 1)]
-            } else {
-                let [lo, hi] = stretch.interval(first, last);
-                let lo = lo.max(span[0]);
-                // A sliver still has a width here.
-                [lo, hi.min(span[1]).max(lo + 1e-6)]
-            };
-            out.push(Piece { block, texels: [first, last], held: stretch.held_texel(), interval });
-        }
-    }
-    out
+    sum / f64::from(SUBDIVISION * SUBDIVISION)
 }
 
 #[cfg(test)]

@@ -2,14 +2,56 @@
 //! way or follows a given point, and everything that decides on probabilities is the same.
 
 use super::barycentric::{self, Lattice};
-use super::cell::Cell;
-use super::node::{LEAF, Node, Root};
+use super::cell::{self, Cell};
+use super::node::{self, Block, LEAF, Root};
 use crate::warp::{Variate, keep_possible, pick, sum};
 
 /// What the level above knows of a cell beyond the average of the texture over it.
 pub(crate) trait Shape {
     /// How much a cell with a weight texture of one would send to the shading point.
     fn worth(&self, cell: &Cell) -> Worth;
+
+    /// The same of all parts of a cell whose average is not zero. `even` is what was said of the cell itself.
+    fn worths<const M: usize>(&self, cell: &Cell, texture: &Parts<'_, M>, _even: bool) -> Worths<M> {
+        let mut worths = Worths { weights: [0.0; M], uniform: [true; M], even: [true; M] };
+        for i in (0..M).filter(|&i| texture.averages[i] > 0.0) {
+            let worth = self.worth(&cell.child::<M>(i));
+            (worths.weights[i], worths.uniform[i], worths.even[i]) = (worth.weight, worth.uniform, worth.even);
+        }
+        worths
+    }
+}
+
+/// The texture on the parts of a cell.
+pub(crate) struct Parts<'a, const M: usize> {
+    blocks: &'a [Block<M>],
+    node: u32,
+    /// Relative average weights.
+    pub(crate) averages: [f32; M],
+}
+
+impl<const M: usize> Parts<'_, M> {
+    /// Where the weight of each part has its centre, by corner of the part, as far as the next level shows.
+    #[inline]
+    pub(crate) fn centers(&self) -> [[f32; M]; 3] {
+        let mut centers = [[1.0 / 3.0; M]; 3];
+        if self.node == LEAF {
+            return centers;
+        }
+        for (i, average) in self.averages.iter().enumerate() {
+            let below = node::below(self.blocks, self.node, i);
+            if below == LEAF || *average == 0.0 {
+                continue;
+            }
+            let averages = node::averages(self.blocks, below);
+            let total: f32 = averages.iter().sum();
+            for (k, weights) in cell::center_weights::<M>().iter().enumerate() {
+                let sum: f32 = weights.iter().zip(&averages).map(|(w, a)| w * a).sum();
+                centers[k][i] = sum / total;
+            }
+        }
+        centers
+    }
 }
 
 /// What [`Shape`] says of one cell.
@@ -19,6 +61,19 @@ pub(crate) struct Worth {
     pub(crate) weight: f32,
     /// Whether the descent can end here as far as everything but the texture is concerned.
     pub(crate) uniform: bool,
+    /// Whether what is seen behind the cell is the same all over it.
+    pub(crate) even: bool,
+}
+
+/// What [`Shape`] says of the parts of a cell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Worths<const M: usize> {
+    /// See [`Worth::weight`].
+    pub(crate) weights: [f32; M],
+    /// See [`Worth::uniform`].
+    pub(crate) uniform: [bool; M],
+    /// See [`Worth::even`].
+    pub(crate) even: [bool; M],
 }
 
 /// What leads a descent from a cell to one of its children.
@@ -99,43 +154,41 @@ impl Guide for Follow {
 /// Descends from the whole triangle to a cell over which the density is constant. Returns it with its probability;
 /// `None` where nothing can arrive from the cell that the guide leads to.
 pub(crate) fn descend<const M: usize>(
-    nodes: &[Node<M>],
+    blocks: &[Block<M>],
     root: Root,
     vertices: [glam::Vec3; 3],
     shape: &impl Shape,
     guide: &mut impl Guide,
 ) -> Option<(Cell, f64)> {
-    descend_below(nodes, root.node, Cell::root(vertices), shape, guide)
+    descend_below(blocks, root.node, Cell::root(vertices), shape, guide)
 }
 
 /// [`descend`] from a cell and the node below it.
 #[inline]
 pub(crate) fn descend_below<const M: usize>(
-    nodes: &[Node<M>],
+    blocks: &[Block<M>],
     mut node: u32,
     mut cell: Cell,
     shape: &impl Shape,
     guide: &mut impl Guide,
 ) -> Option<(Cell, f64)> {
-    let mut uniform = false;
+    let (mut uniform, mut even) = (false, false);
     if node == LEAF {
         let worth = shape.worth(&cell);
         if worth.weight == 0.0 {
             return None;
         }
-        uniform = worth.uniform;
+        (uniform, even) = (worth.uniform, worth.even);
     }
     let mut pmf = 1.0;
     let smallest = barycentric::LATTICE >> (barycentric::MAX_DEPTH - barycentric::level_halvings::<M>());
     while cell.domain.size >= smallest && (node != LEAF || !uniform) {
-        let averages = if node == LEAF { [1.0; M] } else { nodes[node as usize].averages() };
-        let children: [Cell; M] = core::array::from_fn(|i| cell.child::<M>(i));
-        let worths: [Worth; M] = core::array::from_fn(|i| match averages[i] {
-            0.0 => Worth { weight: 0.0, uniform: true },
-            _ => shape.worth(&children[i]),
-        });
-        let mut weights: [f32; M] = core::array::from_fn(|i| averages[i] * worths[i].weight);
-        keep_possible(&mut weights, |i| averages[i] > 0.0 && worths[i].weight > 0.0);
+        let parts =
+            Parts { blocks, node, averages: if node == LEAF { [1.0; M] } else { node::averages(blocks, node) } };
+        let averages = &parts.averages;
+        let worths = shape.worths(&cell, &parts, even);
+        let mut weights: [f32; M] = core::array::from_fn(|i| averages[i] * worths.weights[i]);
+        keep_possible(&mut weights, |i| averages[i] > 0.0 && worths.weights[i] > 0.0);
         let total = sum(&weights);
         if total == 0.0 {
             return None;
@@ -146,10 +199,10 @@ pub(crate) fn descend_below<const M: usize>(
         }
         pmf *= f64::from(weights[index]) / total;
         if node != LEAF {
-            node = nodes[node as usize].below(index);
+            node = node::below(blocks, node, index);
         }
-        cell = children[index];
-        uniform = worths[index].uniform;
+        cell = cell.child::<M>(index);
+        (uniform, even) = (worths.uniform[index], worths.even[index]);
     }
     Some((cell, pmf))
 }

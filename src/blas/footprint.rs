@@ -5,7 +5,7 @@ use glam::Vec2;
 use crate::blas::barycentric::{Cell, LATTICE};
 use crate::blas::texture::Texture;
 use crate::error::{Error, Kind};
-use crate::math::floor64;
+use crate::math::{floor64, sqrt64};
 
 /// Texture coordinates may be this large. Up to here texel indices stay exact, and beyond it an `f32` cannot tell the
 /// texels of a larger image apart anyway.
@@ -50,6 +50,12 @@ impl Chart {
         let (e0, e1, e2) = (edge(a, b), edge(a, c), edge(b, c));
         let square = |e: [f64; 2]| e[0] * e[0] + e[1] * e[1];
         ((e0[0] * e1[1] - e0[1] * e1[0]).abs(), square(e0).max(square(e1)).max(square(e2)))
+    }
+
+    /// Area, or length where that is more, in texels.
+    pub(crate) fn covered(&self) -> f64 {
+        let (double_area, longest) = self.extent();
+        (0.5 * double_area).max(sqrt64(longest))
     }
 
     /// Width and height of the box around the triangle, in texels.

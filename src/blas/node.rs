@@ -1,62 +1,70 @@
 //! What a BLAS is made of: plain data, in one pool for all triangles of a sampler.
+//!
+//! A node is `M` cells in the order of [`barycentric::child`](crate::blas::barycentric::child); node `i` owns the
+//! cells from `i M` on. The nodes of a tree are numbered breadth first, so that the nodes below the cells of a block
+//! have successive numbers, and a bit a cell tells them all (Jacobson 1989, level-order unary degree sequence).
+
+use alloc::vec::Vec;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::blas::barycentric::{MAX_DEPTH, level_halvings};
-use crate::blas::coverage::MAX_AVERAGE;
-use crate::error::{Error, Kind};
-use alloc::vec;
+use crate::blas::code::{LARGEST, decode, encode};
 
 /// Stands for "no node below": the weight is taken for constant over the cell.
 pub(crate) const LEAF: u32 = u32::MAX;
 
-/// The `M` cells of a triangle or of a cell of it, in the order of
-/// [`barycentric::child`](crate::blas::barycentric::child).
+/// Cells of a block. A tree starts at the first cell of one.
+pub(crate) const CELLS: usize = 32;
+
+/// Successive cells: eight nodes of arity 4, two of arity 16, half of one of arity 64.
 ///
-/// Row 0 holds the average weights as the bits of an `f32`; row 1 the pool index of the node below each cell, always
-/// larger than this node's own, or [`LEAF`].
+/// Word 0 has the bit of every cell that has a node below, word 1 the number of the first such node. The bytes of the
+/// others are the [codes](crate::blas::code) of the average weights over the cells.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub(crate) struct Node<const M: usize>([[u32; M]; 2]);
+pub(crate) struct Block<const M: usize>([u32; 2 + CELLS / 4]);
 
-const _: () = assert!(size_of::<Node<4>>() == 32 && size_of::<Node<16>>() == 128 && size_of::<Node<64>>() == 512);
+const _: () = assert!(size_of::<Block<4>>() == 40);
 
-impl<const M: usize> Node<M> {
-    /// A black node without others below.
-    pub(crate) const fn black() -> Self {
-        Self([[0; M], [LEAF; M]])
-    }
-
-    /// Average weight over a cell: 0, or a normal number up to 1e30. Positive wherever any look-up in the cell is.
+impl<const M: usize> Block<M> {
     #[inline(always)]
-    pub(crate) fn average(&self, cell: usize) -> f32 {
-        f32::from_bits(self.0[0][cell])
+    fn codes(&self) -> &[u8; CELLS] {
+        let bytes: &[u8; 8 + CELLS] = bytemuck::cast_ref(&self.0);
+        bytes.last_chunk().expect("a block is longer than its codes")
     }
 
-    /// The averages of all cells.
+    /// Which cells have a node below.
     #[inline(always)]
-    pub(crate) fn averages(&self) -> [f32; M] {
-        self.0[0].map(f32::from_bits)
+    pub(crate) fn divided(&self) -> u32 {
+        self.0[0]
     }
+}
 
-    /// The node below a cell, or [`LEAF`].
-    #[inline(always)]
-    pub(crate) fn below(&self, cell: usize) -> u32 {
-        self.0[1][cell]
+/// Relative average weights over the cells of a node. Positive wherever any look-up in the cell is.
+#[inline(always)]
+pub(crate) fn averages<const M: usize>(blocks: &[Block<M>], node: u32) -> [f32; M] {
+    let first = node as usize * M;
+    let mut averages = [0.0; M];
+    for (part, averages) in averages.chunks_mut(CELLS).enumerate() {
+        let codes = &blocks[first / CELLS + part].codes()[first % CELLS..][..M.min(CELLS)];
+        averages.iter_mut().zip(codes).for_each(|(average, code)| *average = decode(*code));
     }
+    averages
+}
 
-    /// Mean of the cells, which all cover the same area.
-    pub(crate) fn mean(&self) -> f64 {
-        self.0[0].iter().map(|&bits| f64::from(f32::from_bits(bits))).sum::<f64>() / M as f64
-    }
+/// The node below a cell of a node, or [`LEAF`].
+#[inline(always)]
+pub(crate) fn below<const M: usize>(blocks: &[Block<M>], node: u32, cell: usize) -> u32 {
+    let at = node as usize * M + cell;
+    let [divided, first, ..] = blocks[at / CELLS].0;
+    let bit = 1 << (at % CELLS);
+    if divided & bit == 0 { LEAF } else { first.wrapping_add((divided & (bit - 1)).count_ones()) }
+}
 
-    pub(crate) fn set_average(&mut self, cell: usize, average: f32) {
-        self.0[0][cell] = average.to_bits();
-    }
-
-    pub(crate) fn set_below(&mut self, cell: usize, node: u32) {
-        self.0[1][cell] = node;
-    }
+/// Mean of a node's relative averages.
+#[inline]
+pub(crate) fn mean<const M: usize>(blocks: &[Block<M>], node: u32) -> f32 {
+    averages(blocks, node).iter().sum::<f32>() / M as f32
 }
 
 /// The BLAS of one triangle.
@@ -65,7 +73,7 @@ impl<const M: usize> Node<M> {
 pub(crate) struct Root {
     /// Average weight over the triangle.
     pub(crate) average: f32,
-    /// The first node's index in the pool, or [`LEAF`] where one weight holds for the whole triangle.
+    /// The first node's number in the pool, or [`LEAF`] where one weight holds for the whole triangle.
     pub(crate) node: u32,
 }
 
@@ -76,125 +84,39 @@ impl Root {
     }
 }
 
-fn is_average(value: f32) -> bool {
-    // NaN fails, and so does -0.0's neighbour below.
-    (0.0..=MAX_AVERAGE).contains(&value)
+/// Appends a tree. `averages` are those of all cells, breadth first; `divided` says which have a node below, in the
+/// order of the nodes. Returns the number of its first node.
+///
+/// The caller has made sure with [`end`] that numbers suffice.
+pub(crate) fn append<const M: usize>(blocks: &mut Vec<Block<M>>, averages: &[f32], divided: &[bool]) -> u32 {
+    let root = first_free(blocks);
+    let largest = averages.iter().fold(f32::MIN_POSITIVE, |largest, average| largest.max(*average));
+    let mut next = root + 1;
+    for (averages, divided) in averages.chunks(CELLS).zip(divided.chunks(CELLS)) {
+        let mut block = Block([0; 2 + CELLS / 4]);
+        block.0[1] = next;
+        for (cell, (average, divided)) in averages.iter().zip(divided).enumerate() {
+            let code = encode(average / largest * LARGEST);
+            bytemuck::bytes_of_mut(&mut block.0)[8 + cell] = code;
+            block.0[0] |= u32::from(*divided) << cell;
+        }
+        next += block.divided().count_ones();
+        blocks.push(block);
+    }
+    root
 }
 
-fn broken(what: &'static str, at: usize, found: u64, expected: u64) -> Error {
-    Error(Kind::Bytes { what, at, found, expected })
+/// The number that the next tree's first node gets.
+fn first_free<const M: usize>(blocks: &[Block<M>]) -> u32 {
+    (blocks.len() * CELLS / M) as u32
 }
 
-/// Checks a pool that came from outside: afterwards every descent from any node ends, stays in bounds, and finds a
-/// positive cell below every positive cell.
-pub(crate) fn validate<const M: usize>(nodes: &[Node<M>]) -> Result<(), Error> {
-    let max_levels = MAX_DEPTH / level_halvings::<M>();
-    // A node's level: how many nodes are above it on the longest way. Ways lead up in the pool only.
-    let mut levels = vec![1u8; nodes.len()];
-    for (i, node) in nodes.iter().enumerate() {
-        let at = i * size_of::<Node<M>>();
-        for cell in 0..M {
-            let (average, below) = (node.average(cell), node.below(cell));
-            let here = at + 4 * cell;
-            if !is_average(average) {
-                return Err(broken("weight of a cell", here, average.to_bits().into(), MAX_AVERAGE.to_bits().into()));
-            }
-            if below == LEAF {
-                continue;
-            }
-            let there = here + 4 * M;
-            let Some(child) = nodes.get(below as usize).filter(|_| below as usize > i) else {
-                return Err(broken("index of a node", there, below.into(), nodes.len() as u64));
-            };
-            let level = levels[i] + 1;
-            if u32::from(level) > max_levels {
-                return Err(broken("depth of a node", there, level.into(), max_levels.into()));
-            }
-            if (child.mean() > 0.0) != (average > 0.0) {
-                return Err(broken(
-                    "weight of a cell",
-                    here,
-                    average.to_bits().into(),
-                    child.average(0).to_bits().into(),
-                ));
-            }
-            levels[below as usize] = levels[below as usize].max(level);
-        }
-    }
-    Ok(())
+/// The number of nodes in the pool after a tree of `nodes` was appended.
+pub(crate) fn end<const M: usize>(blocks: &[Block<M>], nodes: usize) -> usize {
+    blocks.len() * CELLS / M + nodes
 }
 
-/// Checks the roots into a pool that [`validate`] has passed.
-pub(crate) fn validate_roots<const M: usize>(roots: &[Root], nodes: &[Node<M>]) -> Result<(), Error> {
-    for (i, root) in roots.iter().enumerate() {
-        let at = i * size_of::<Root>();
-        if !is_average(root.average) {
-            return Err(broken(
-                "weight of a triangle",
-                at,
-                root.average.to_bits().into(),
-                MAX_AVERAGE.to_bits().into(),
-            ));
-        }
-        if root.node == LEAF {
-            continue;
-        }
-        let Some(node) = nodes.get(root.node as usize) else {
-            return Err(broken("index of a node", at + 4, root.node.into(), nodes.len() as u64));
-        };
-        if (node.mean() > 0.0) != (root.average > 0.0) {
-            return Err(broken(
-                "weight of a triangle",
-                at,
-                root.average.to_bits().into(),
-                node.average(0).to_bits().into(),
-            ));
-        }
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use alloc::vec::Vec;
-
-    fn chain(n: usize) -> Vec<Node<4>> {
-        (0..n)
-            .map(|i| {
-                let mut node = Node::black();
-                node.set_average(2, 1.0);
-                if i + 1 < n {
-                    node.set_below(2, i as u32 + 1);
-                }
-                node
-            })
-            .collect()
-    }
-
-    #[test]
-    fn bytes_from_outside() {
-        assert!(validate::<4>(&[]).is_ok());
-        assert!(validate(&chain(20)).is_ok());
-        assert!(validate(&chain(21)).is_err());
-        let broken = |change: fn(&mut Node<4>)| {
-            let mut nodes = chain(3);
-            change(&mut nodes[1]);
-            validate(&nodes).is_err()
-        };
-        assert!(broken(|n| n.set_below(0, 3)));
-        assert!(broken(|n| n.set_below(2, 1)));
-        assert!(broken(|n| n.set_below(2, 0)));
-        assert!(broken(|n| n.set_average(2, 0.0)));
-        for bad in [f32::NAN, f32::INFINITY, -1.0, 1e31] {
-            let mut nodes = chain(1);
-            nodes[0].set_average(1, bad);
-            assert!(validate(&nodes).is_err(), "{bad}");
-            assert!(validate_roots::<4>(&[Root::constant(bad)], &nodes).is_err());
-        }
-        let nodes = chain(2);
-        assert!(validate_roots(&[Root { average: 0.25, node: 1 }, Root::constant(0.0)], &nodes).is_ok());
-        assert!(validate_roots(&[Root { average: 0.25, node: 2 }], &nodes).is_err());
-        assert!(validate_roots(&[Root { average: 0.0, node: 0 }], &nodes).is_err());
-    }
+/// Whether the tree of a root, if there is one, starts in this part of a pool.
+pub(crate) fn holds<const M: usize>(blocks: &[Block<M>], root: Root) -> bool {
+    root.node == LEAF || (root.node as usize) < end(blocks, 0)
 }

@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use crate::blas::build::BYTES_PER_IMAGE;
 use crate::blas::texture::Texture;
 
 /// What is known of a block of texels.
@@ -21,6 +22,8 @@ pub(crate) struct Prepared<'a> {
     texture: Texture<'a>,
     /// From level 1 up to the one that is a single block.
     levels: Vec<Level>,
+    /// Bytes that trees over this image may still take beyond two a texel.
+    pub(super) extra: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -32,7 +35,7 @@ struct Level {
 impl<'a> Prepared<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
-        let mut prepared = Self { texture, levels: Vec::new() };
+        let mut prepared = Self { texture, levels: Vec::new(), extra: BYTES_PER_IMAGE };
         let mut size = texture.size();
         while size != [1, 1] {
             let below = prepared.levels.len() as u32;

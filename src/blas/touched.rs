@@ -30,7 +30,10 @@ fn support(filter: Filter) -> f64 {
     }
 }
 
-/// The range over a footprint. The footprint is closed and, where a host's `f32` could round across its edge, a
+/// Blocks of a large footprint are as small as this share of it.
+const BLOCKS: u32 = 8;
+
+/// The range over a footprint; over blocks of texels that it meets, if it is larger than 16 texels. The footprint is closed and, where a host's `f32` could round across its edge, a
 /// little larger. With `exact` false it is enough that a range which is not constant is found not to be.
 ///
 /// Where a footprint spans many copies of the image along an axis, all of the image along that axis counts.
@@ -44,7 +47,10 @@ pub(crate) fn range(prepared: &Prepared<'_>, footprint: &Footprint, exact: bool)
         stretches(texture.wrapping()[k], texture.size()[k], from, to, footprint.origin[k])
     };
     let (columns, rows) = (along(0), along(1));
-    let mut search = Search { prepared, footprint, reach, exact, range: Range { min: f32::INFINITY, max: 0.0 } };
+    let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
+    let finest = (0..prepared.top()).take_while(|level| span > f64::from((2 * BLOCKS) << level)).count() as u32;
+    let range = Range { min: f32::INFINITY, max: 0.0 };
+    let mut search = Search { prepared, footprint, reach, exact, finest, range };
     for row in &rows {
         for column in &columns {
             search.stretch(column, row);
@@ -64,6 +70,8 @@ struct Search<'a> {
     footprint: &'a Footprint,
     reach: [f64; 2],
     exact: bool,
+    /// Blocks of this level are not looked into.
+    finest: u32,
     range: Range,
 }
 
@@ -101,7 +109,7 @@ impl Search<'_> {
         if !self.footprint.meets(grow(column.interval(x0, x1), 0), grow(row.interval(y0, y1), 1)) {
             return;
         }
-        if level == 0 || block.min == block.max {
+        if level <= self.finest || block.min == block.max {
             self.range.min = self.range.min.min(block.min);
             self.range.max = self.range.max.max(block.max);
             return;

@@ -24,7 +24,7 @@ use glam::Vec3;
 const DEFENSIVE: f32 = 0.02;
 
 /// Ratio of least to largest radiance from which a region counts as even.
-const EVEN: f32 = 0.75;
+const EVEN: f32 = 0.6;
 
 /// Slack of the box for the rounding of the map (2.5e-7 at worst), of the rotation and of the direction.
 const ROUNDING: f32 = 1e-6;
@@ -57,7 +57,7 @@ impl Footprint {
 pub(crate) struct Average {
     /// Estimate of the mean radiance. Zero only if the whole region is black.
     pub(crate) value: f32,
-    /// Whether the region is known to have no contrast worth a closer look: none at all, or at most that of 3 to 4.
+    /// Whether the region is known to have no contrast worth a closer look: none at all, or at most that of 3 to 5.
     pub(crate) even: bool,
 }
 

@@ -69,6 +69,17 @@ impl Polygon {
         self.fan().iter().sum()
     }
 
+    /// Whether a point lies inside, or outside by no more than so much.
+    #[cfg(test)]
+    pub(super) fn holds(&self, [x, y]: [f32; 2], slack: f32) -> bool {
+        let edges = (0..self.len).map(|i| (self.vertices[i], self.vertices[(i + 1) % self.len]));
+        let left = |(a, b): ([f32; 2], [f32; 2])| {
+            let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+            dx * (y - a[1]) - dy * (x - a[0]) >= -slack * (dx * dx + dy * dy).sqrt()
+        };
+        { edges }.all(left)
+    }
+
     /// A uniform point.
     pub(super) fn sample(&self, mut u: [Variate; 2]) -> [f32; 2] {
         let areas = self.fan();

@@ -1,7 +1,7 @@
 //! Small bright parts of the image, taken out of what portals are guided by.
 //!
 //! A sun of a few texels can carry more than all the rest of the sky. Whether it is seen through a portal is a matter
-//! of one ray, but an average over a cell of the portal can only guess. So the image is split, once: its brightest
+//! of geometry, but an average over a cell of the portal can only guess. So the image is split, once: its brightest
 //! texels, up to the excess over a cap, become *suns*, each with a direction and a power; the rest is capped, and its
 //! contrast is bounded.
 
@@ -15,20 +15,20 @@ use super::pyramid::level_start;
 use super::texel::SunTexel;
 use crate::warp::equal_area::{SPHERE, square_to_sphere, wrap_texel_log2};
 
-/// Most suns of an environment: each costs every sample a few rays against the portals.
+/// Most suns of an environment: each costs every shading point a walk down the tree over portals.
 pub(crate) const MAX_SUNS: usize = 8;
 
 /// A texel this many times brighter than the mean of the capped image belongs to a sun.
 const CONTRAST: f64 = 16.0;
-/// Largest angular radius of a sun, as a sine. What is larger is too often seen in part for a few rays to tell.
+/// Largest angular radius of a sun, as a sine. What is larger is no detail.
 const LARGEST: f32 = 0.15;
-/// A split that takes out less than this share of the flux is not worth its rays.
+/// A split that takes out less than this share of the flux is not worth its walk.
 const LEAST_SHARE: f64 = 0.01;
 /// Most texels in suns, as a share of the image.
 const MOST_TEXELS: usize = 256;
 
 /// Most texels of a sun, after merging: they bound what a shading point costs where a sun is seen in part.
-const MOST_BLOCKS: usize = 64;
+const MOST_BLOCKS: usize = 256;
 
 /// A cluster of bright texels.
 #[repr(C)]

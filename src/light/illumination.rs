@@ -45,43 +45,93 @@ impl Illumination {
             .find(|kind| *kind as u32 == value)
     }
 
-    /// The estimate for a cell with these vertices relative to the shading point and this area, in a plane at a
-    /// height (distance) `height` from it. Zero only below the horizon; never NaN, possibly infinite.
-    #[inline]
-    pub(crate) fn estimate(self, receiver: &Receiver, vertices: &[Vec3; 3], area: f32, height: f32) -> f32 {
-        if let Receiver::Surface(normal) = *receiver
-            && is_below(normal, vertices)
-        {
-            return 0.0;
+    /// The estimates for cells of one size in a plane. Zero only below the horizon; never NaN, possibly infinite.
+    #[inline(always)]
+    pub(crate) fn estimate<const M: usize>(
+        self,
+        receiver: &Receiver,
+        cells: &Views<M>,
+        vertices: impl Fn(usize) -> [Vec3; 3],
+    ) -> [f32; M] {
+        let mut estimates = match self {
+            Self::ClampedVertices => clamped_vertices(receiver, cells),
+            _ => core::array::from_fn(|i| self.at_center(receiver, cells, i, &vertices)),
+        };
+        if let Receiver::Surface(_) = receiver {
+            let [a, b, c] = &cells.heights;
+            for (i, estimate) in estimates.iter_mut().enumerate() {
+                let highest = a[i].max(b[i]).max(c[i]);
+                *estimate = if highest < cells.horizon { 0.0 } else { *estimate };
+            }
         }
-        let [a, b, c] = *vertices;
-        let center = (a + b + c) * (1.0 / 3.0);
-        if self == Self::ClampedVertices {
-            let distance2 = (center.length_squared() + SOFTENING * area).max(f32::MIN_POSITIVE);
-            let toward = match *receiver {
-                Receiver::Surface(n) => n.dot(a).max(0.0) + n.dot(b).max(0.0) + n.dot(c).max(0.0),
-                Receiver::Transmissive(n) => n.dot(a).abs() + n.dot(b).abs() + n.dot(c).abs(),
-                Receiver::Volume => 3.0 * math::sqrt(distance2),
-            };
-            let term = area * height * toward * (FRAC_1_PI / 3.0) / (distance2 * distance2);
-            return term.max(f32::MIN_POSITIVE);
-        }
-        // No point of the plane is nearer than its height.
-        let distance2 = center.length_squared().max(height * height).max(f32::MIN_POSITIVE);
+        estimates
+    }
+
+    /// The terms that look at the centre of a cell.
+    fn at_center<const M: usize>(
+        self,
+        receiver: &Receiver,
+        cells: &Views<M>,
+        i: usize,
+        vertices: &impl Fn(usize) -> [Vec3; 3],
+    ) -> f32 {
+        let (area, distance2) = (cells.area, cells.distance2[i]);
         let inverse = 1.0 / math::sqrt(distance2);
-        let cos_l = (height * inverse).min(1.0);
-        let cos_s = match *receiver {
-            Receiver::Surface(normal) => normal.dot(center) * inverse,
-            Receiver::Transmissive(normal) => (normal.dot(center) * inverse).abs(),
+        let cos_l = (cells.height * inverse).min(1.0);
+        let mean = cells.heights.iter().map(|height| height[i]).sum::<f32>() * (1.0 / 3.0);
+        let cos_s = match receiver {
+            Receiver::Surface(_) => mean * inverse,
+            Receiver::Transmissive(_) => mean.abs() * inverse,
             Receiver::Volume => 1.0,
         };
         let conservative = area * (1.0 + cos_s).max(LEAST_COSINE) * (1.0 + cos_l) * (0.25 * FRAC_1_PI) / distance2;
         match self {
             Self::ClampedVertices | Self::Conservative => conservative,
             Self::PointToPoint => area * cos_s.max(LEAST_COSINE) * cos_l.max(LEAST_COSINE) * FRAC_1_PI / distance2,
-            Self::Boundary => boundary(receiver, vertices).max(LEAST_BOUNDARY * conservative),
+            Self::Boundary => boundary(receiver, &vertices(i)).max(LEAST_BOUNDARY * conservative),
         }
     }
+}
+
+/// Cells of one size in a plane as a shading point sees them.
+pub(crate) struct Views<const M: usize> {
+    /// Heights of the corners over the receiver's plane, if it has a normal.
+    pub(crate) heights: [[f32; M]; 3],
+    /// Weights of the corners.
+    pub(crate) weights: [[f32; M]; 3],
+    /// Below the horizon for certain is what is lower than this.
+    pub(crate) horizon: f32,
+    /// Squared distances of the centres; positive.
+    pub(crate) distance2: [f32; M],
+    /// Area of each.
+    pub(crate) area: f32,
+    /// Distance of the shading point from their plane.
+    pub(crate) height: f32,
+}
+
+/// The default. Neither square roots nor branches on a surface, so that cells share vector registers.
+#[inline(always)]
+fn clamped_vertices<const M: usize>(receiver: &Receiver, cells: &Views<M>) -> [f32; M] {
+    let [[a, b, c], [p, q, r]] = [&cells.heights, &cells.weights];
+    let softened: [f32; M] = core::array::from_fn(|i| cells.distance2[i] + SOFTENING * cells.area);
+    let toward: [f32; M] = match receiver {
+        Receiver::Surface(_) => {
+            core::array::from_fn(|i| p[i] * a[i].max(0.0) + q[i] * b[i].max(0.0) + r[i] * c[i].max(0.0))
+        }
+        Receiver::Transmissive(_) => {
+            core::array::from_fn(|i| p[i] * a[i].abs() + q[i] * b[i].abs() + r[i] * c[i].abs())
+        }
+        Receiver::Volume => core::array::from_fn(|i| math::sqrt(softened[i])),
+    };
+    let scale = cells.area * cells.height * FRAC_1_PI;
+    core::array::from_fn(|i| (scale * toward[i] / (softened[i] * softened[i])).max(f32::MIN_POSITIVE))
+}
+
+/// Height over the receiver's plane below which a vertex is so for certain, whatever rounding has done to those of
+/// cells of the triangle with these vertices.
+pub(crate) fn horizon(normal: Vec3, vertices: &[Vec3; 3]) -> f32 {
+    let largest = vertices.iter().fold(0.0, |largest: f32, v| largest.max(normal.abs().dot(v.abs())));
+    -ROUNDING * largest
 }
 
 /// Whether all vertices lie below the horizon of a normal, and not just by rounding.
@@ -185,6 +235,21 @@ mod tests {
         }
     }
 
+    /// The estimate for one cell.
+    fn estimate(strategy: Illumination, receiver: &Receiver, vertices: [Vec3; 3]) -> f32 {
+        let normal = if let Receiver::Surface(normal) = *receiver { normal } else { Vec3::Z };
+        let [a, b, c] = vertices;
+        let cells = Views {
+            heights: vertices.map(|v| [normal.dot(v)]),
+            weights: [[1.0 / 3.0]; 3],
+            horizon: horizon(normal, &vertices),
+            distance2: [((a + b + c) / 3.0).length_squared()],
+            area: 0.5,
+            height: 0.3,
+        };
+        strategy.estimate(receiver, &cells, |_| vertices)[0]
+    }
+
     #[test]
     fn only_cells_below_the_horizon_are_worth_nothing() {
         let strategies = [
@@ -197,10 +262,10 @@ mod tests {
         let below = [Vec3::new(0.0, 0.0, -1.0), Vec3::new(1.0, 0.0, -0.1), Vec3::new(0.0, 1.0, -0.5)];
         let crossing = [below[0], below[1], Vec3::new(0.0, 1.0, 1e-3)];
         for strategy in strategies {
-            assert_eq!(strategy.estimate(&up, &below, 0.5, 0.3), 0.0);
-            assert!(strategy.estimate(&up, &crossing, 0.5, 0.3) > 0.0);
-            assert!(strategy.estimate(&Receiver::Volume, &below, 0.5, 0.3) > 0.0);
-            assert!(strategy.estimate(&Receiver::Transmissive(Vec3::Z), &below, 0.5, 0.3) > 0.0);
+            assert_eq!(estimate(strategy, &up, below), 0.0);
+            assert!(estimate(strategy, &up, crossing) > 0.0);
+            assert!(estimate(strategy, &Receiver::Volume, below) > 0.0);
+            assert!(estimate(strategy, &Receiver::Transmissive(Vec3::Z), below) > 0.0);
         }
     }
 }

@@ -3,6 +3,7 @@
 mod illumination;
 mod sun;
 mod triangle;
+mod worth;
 
 pub use illumination::Illumination;
 pub(crate) use sun::{Part, Sunlit};

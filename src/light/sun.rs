@@ -1,7 +1,7 @@
 //! One sun of the environment through one light triangle.
 
 use super::triangle::Lit;
-use crate::blas::{self, Cell, Domain, Draw, Follow, LEAF, Lattice, Node, Root, Shape, Worth};
+use crate::blas::{self, Block, Cell, Domain, Draw, Follow, LEAF, Lattice, Root, Shape, Worth};
 use crate::env::{Cover, EnvironmentView, Opening};
 use crate::warp::Variate;
 
@@ -45,15 +45,17 @@ impl Sunlit<'_> {
 
     /// Finds the parts of the triangle that the sun is seen through, and what it sends through each. A part is all of
     /// one opacity, or small.
-    pub(crate) fn visit<const M: usize>(&self, nodes: &[Node<M>], root: Root, found: &mut impl FnMut(Part, f32)) {
-        self.visit_below(nodes, &Cell::root(self.lit.vertices), root, found);
+    pub(crate) fn visit<const M: usize>(&self, blocks: &[Block<M>], root: Root, found: &mut impl FnMut(Part, f32)) {
+        let scale = if root.node == LEAF { 1.0 } else { root.average / blas::mean(blocks, root.node) };
+        self.visit_below(blocks, &Cell::root(self.lit.vertices), root, scale, found);
     }
 
     fn visit_below<const M: usize>(
         &self,
-        nodes: &[Node<M>],
+        blocks: &[Block<M>],
         cell: &Cell,
         below: Root,
+        scale: f32,
         found: &mut impl FnMut(Part, f32),
     ) {
         let opening = self.opening(cell.domain);
@@ -67,20 +69,20 @@ impl Sunlit<'_> {
             }
             return;
         }
-        let node = &nodes[below.node as usize];
-        for i in 0..M {
-            let root = Root { average: node.average(i), node: node.below(i) };
-            self.visit_below(nodes, &cell.child::<M>(i), root, found);
+        let averages = blas::averages(blocks, below.node);
+        for (i, average) in averages.into_iter().enumerate() {
+            let root = Root { average: average * scale, node: blas::below(blocks, below.node, i) };
+            self.visit_below(blocks, &cell.child::<M>(i), root, scale, found);
         }
     }
 
     /// Draws a point in a part.
-    pub(crate) fn sample<const M: usize>(&self, nodes: &[Node<M>], part: Part, u: [Variate; 2]) -> Option<Lattice> {
+    pub(crate) fn sample<const M: usize>(&self, blocks: &[Block<M>], part: Part, u: [Variate; 2]) -> Option<Lattice> {
         if part.node == LEAF {
             return self.sample_in(part.domain, Some(part.through), u);
         }
         let mut draw = Draw::new(u);
-        let (cell, _) = blas::descend_below(nodes, part.node, self.cell(part.domain), self, &mut draw)?;
+        let (cell, _) = blas::descend_below(blocks, part.node, self.cell(part.domain), self, &mut draw)?;
         self.sample_in(cell.domain, None, draw.rest())
     }
 
@@ -94,12 +96,12 @@ impl Sunlit<'_> {
     }
 
     /// Density per solid angle with which [`Self::sample`] draws a point of the part, over the sun's excess there.
-    pub(crate) fn pdf_per_excess<const M: usize>(&self, nodes: &[Node<M>], part: Part, place: Lattice) -> f64 {
+    pub(crate) fn pdf_per_excess<const M: usize>(&self, blocks: &[Block<M>], part: Part, place: Lattice) -> f64 {
         if part.node == LEAF {
             return 1.0 / f64::from(part.through);
         }
         let mut follow = Follow::below(part.domain, place);
-        let found = blas::descend_below(nodes, part.node, self.cell(part.domain), self, &mut follow);
+        let found = blas::descend_below(blocks, part.node, self.cell(part.domain), self, &mut follow);
         found.map_or(0.0, |(cell, pmf)| match self.through(&cell) {
             0.0 => 0.0,
             through => pmf / f64::from(through),
@@ -111,7 +113,7 @@ impl Sunlit<'_> {
     }
 
     fn is_small(&self, cell: &Cell) -> bool {
-        let center = cell.center();
+        let center = cell.vertices.iter().sum::<glam::Vec3>() * (1.0 / 3.0);
         let radius2 = cell.vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
         let reach = SMALL * self.environment.suns()[self.sun].sin_radius;
         radius2 <= reach * reach * center.length_squared()
@@ -120,6 +122,6 @@ impl Sunlit<'_> {
 
 impl Shape for Sunlit<'_> {
     fn worth(&self, cell: &Cell) -> Worth {
-        Worth { weight: self.through(cell), uniform: true }
+        Worth { weight: self.through(cell), uniform: true, even: true }
     }
 }

@@ -3,17 +3,14 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
-use super::illumination::{Illumination, is_below};
-use crate::blas::{Cell, Lattice, Root, Shape, Worth};
-use crate::env::{EnvironmentView, Footprint};
+use super::illumination::{Illumination, horizon, is_below};
+use crate::blas::{Lattice, Root};
+use crate::env::EnvironmentView;
 use crate::geometry::{self, Triangle};
-use crate::record::{Receiver, ShadingPoint, TriangleId};
+use crate::record::{Receiver, ShadingPoint};
 
 /// Largest coordinate of a vertex: squares of squares of distances must not overflow where the tree is built.
 pub(crate) const POSITION_LIMIT: f32 = 1e9;
-
-/// Ratio of squared radius to squared distance up to which the geometry is taken for the same all over a cell.
-const FAR: f32 = 1.0 / 16.0;
 
 /// What is kept of every triangle that can send light.
 #[repr(C)]
@@ -21,40 +18,41 @@ const FAR: f32 = 1.0 / 16.0;
 pub(crate) struct LightTriangle {
     /// Counter-clockwise around the front side.
     pub(crate) vertices: [[f32; 3]; 3],
-    /// Number of the mesh, and of the triangle in it.
-    pub(crate) id: [u32; 2],
     /// The tree over its texture.
     pub(crate) root: Root,
-    /// [`Self::TWO_SIDED`] and [`Self::PORTAL`].
-    pub(crate) flags: u32,
+    /// Its number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`].
+    pub(crate) place_and_flags: u32,
 }
+
+const _: () = assert!(size_of::<LightTriangle>() == 48);
 
 impl LightTriangle {
     /// Sends from its back as well.
-    pub(crate) const TWO_SIDED: u32 = 1;
+    pub(crate) const TWO_SIDED: u32 = 1 << 31;
     /// Shows the environment behind it.
-    pub(crate) const PORTAL: u32 = 2;
+    pub(crate) const PORTAL: u32 = 1 << 30;
 
     pub(crate) fn triangle(&self) -> Triangle {
         Triangle(self.vertices.map(Vec3::from))
     }
 
-    pub(crate) fn id(&self) -> TriangleId {
-        TriangleId { mesh: self.id[0], triangle: self.id[1] }
+    /// Its number among all triangles that were added.
+    pub(crate) fn place(&self) -> u32 {
+        self.place_and_flags & !(Self::TWO_SIDED | Self::PORTAL)
     }
 
     pub(crate) fn is_two_sided(&self) -> bool {
-        self.flags & Self::TWO_SIDED != 0
+        self.place_and_flags & Self::TWO_SIDED != 0
     }
 
     pub(crate) fn is_portal(&self) -> bool {
-        self.flags & Self::PORTAL != 0
+        self.place_and_flags & Self::PORTAL != 0
     }
 
     /// Whether the numbers, which may come from outside, are those of a triangle.
     pub(crate) fn is_valid(&self) -> bool {
         let in_range = self.vertices.as_flattened().iter().all(|x| x.abs() <= POSITION_LIMIT);
-        in_range && self.flags & !(Self::TWO_SIDED | Self::PORTAL) == 0 && self.root.average > 0.0
+        in_range && self.root.average > 0.0
     }
 
     /// Whether anything can travel from the triangle to the shading point: the point is on a side that sends, and
@@ -75,7 +73,7 @@ impl LightTriangle {
 /// A light triangle seen from a shading point: the target that its cells are chosen by.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lit<'a> {
-    receiver: Receiver,
+    pub(super) receiver: Receiver,
     /// Relative to the shading point.
     pub(crate) vertices: [Vec3; 3],
     /// The same in double precision.
@@ -84,12 +82,20 @@ pub(crate) struct Lit<'a> {
     pub(crate) normal: Vec3,
     pub(crate) area: f32,
     /// Distance of the shading point from the triangle's plane.
-    height: f32,
+    pub(super) height: f32,
     /// The same in double precision.
     exact_height: f64,
-    illumination: Illumination,
+    /// Squared distance of the farthest vertex from the centroid.
+    pub(super) radius2: f32,
+    /// The receiver's, if it has one.
+    pub(super) normal_of_receiver: Vec3,
+    /// See [`horizon`].
+    pub(super) horizon: f32,
+    /// Of the vertices over the receiver's plane.
+    pub(super) highest: f32,
+    pub(super) illumination: Illumination,
     /// What the triangle is a portal to, if that depends on the direction.
-    environment: Option<EnvironmentView<'a>>,
+    pub(super) environment: Option<EnvironmentView<'a>>,
 }
 
 impl<'a> Lit<'a> {
@@ -106,9 +112,20 @@ impl<'a> Lit<'a> {
         let triangle = light.triangle();
         let (normal, area) = triangle.normal_and_area()?;
         let height = triangle.height(x.position).abs();
+        let vertices = triangle.relative_to(x.position);
+        let [a, b, c] = vertices;
+        let center = (a + b + c) * (1.0 / 3.0);
+        let normal_of_receiver = match x.receiver {
+            Receiver::Surface(normal) | Receiver::Transmissive(normal) => normal,
+            Receiver::Volume => Vec3::ZERO,
+        };
         Some(Self {
             receiver: x.receiver,
-            vertices: triangle.relative_to(x.position),
+            vertices,
+            radius2: vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared())),
+            normal_of_receiver,
+            horizon: horizon(normal_of_receiver, &vertices),
+            highest: vertices.iter().fold(0.0, |h: f32, v| h.max(normal_of_receiver.dot(*v).abs())),
             exact_vertices: triangle.exactly_relative_to(x.position),
             normal,
             area,
@@ -146,40 +163,5 @@ impl<'a> Lit<'a> {
     pub(crate) fn per_solid_angle(&self, pdf_area: f64, point: DVec3) -> Option<f64> {
         let pdf = pdf_area / self.solid_angle_per_area(point);
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
-    }
-}
-
-impl Shape for Lit<'_> {
-    #[inline]
-    fn worth(&self, cell: &Cell) -> Worth {
-        let area = self.area * cell.share();
-        let weight = self.illumination.estimate(&self.receiver, &cell.vertices, area, self.height);
-        if weight == 0.0 {
-            return Worth { weight, uniform: true };
-        }
-        let center = cell.center();
-        let distance2 = center.length_squared().max(self.height * self.height).max(f32::MIN_POSITIVE);
-        let radius2 = cell.vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
-        let far = radius2 <= FAR * distance2;
-        match self.environment {
-            Some(environment) => {
-                let footprint = footprint(center, distance2, radius2, area * self.height);
-                let seen = environment.average(&footprint);
-                let one_texel = footprint.sin_radius < 1.0 && footprint.solid_angle <= environment.texel_solid_angle();
-                Worth { weight: weight * seen.value, uniform: one_texel || (seen.even && far) }
-            }
-            None => Worth { weight, uniform: far },
-        }
-    }
-}
-
-/// The directions in which a cell is seen.
-#[inline]
-fn footprint(center: Vec3, distance2: f32, radius2: f32, area_by_height: f32) -> Footprint {
-    let inverse = 1.0 / crate::math::sqrt(distance2);
-    Footprint {
-        direction: center * inverse,
-        sin_radius: crate::math::sqrt(radius2) * inverse,
-        solid_angle: area_by_height * inverse * inverse * inverse,
     }
 }

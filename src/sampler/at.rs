@@ -1,7 +1,7 @@
 //! A shading point's own sampler: what all questions about one point have in common is found once.
 
 use super::lights::{LightSampler, LightSamplerView};
-use super::suns::Techniques;
+use super::techniques::Techniques;
 use crate::record::ShadingPoint;
 
 /// The lights as seen from one shading point: [`LightSampler::at`].

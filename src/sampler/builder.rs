@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use super::energy::Emission;
+use super::energy::{Energies, Scales};
 use super::lights::{LightSampler, NO_AREA, NO_LEAF};
 use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
 use crate::blas::{self, Prepared, Root, Texture};
@@ -30,7 +30,7 @@ pub struct LightSamplerBuilder<'a, const N: usize = 8, const M: usize = 4> {
     places: Vec<u32>,
     /// Where each mesh starts in `places`, and the end.
     meshes: Vec<u32>,
-    cells: Vec<blas::Node<M>>,
+    cells: Vec<blas::Block<M>>,
     /// Trees over textures by texture and the bits of the three uvs.
     shared: BTreeMap<(usize, [u32; 6]), Root>,
 }
@@ -86,12 +86,12 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         let number = self.meshes.len() - 1;
         self.check(number, mesh)?;
         let before = (self.triangles.len(), self.places.len(), self.cells.len());
-        for (triangle, indices) in (0..).zip(mesh.indices) {
-            if let Err(error) = self.add_triangle(number as u32, triangle, mesh, *indices) {
+        for indices in mesh.indices {
+            if let Err(error) = self.add_triangle(mesh, *indices) {
                 self.triangles.truncate(before.0);
                 self.places.truncate(before.1);
                 self.cells.truncate(before.2);
-                self.shared.retain(|_, root| root.node == blas::LEAF || (root.node as usize) < before.2);
+                self.shared.retain(|_, root| blas::holds(&self.cells, *root));
                 return Err(error);
             }
         }
@@ -122,14 +122,14 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
 
     fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N, M>, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
-        let emission = Emission::new(&environment, &[]);
-        let sends = parallel::collect(self.triangles.len(), |i| emission.energy(&self.triangles[i]) > 0.0);
+        let energies = Energies::new(&environment, Scales::default());
+        let sends = parallel::collect(self.triangles.len(), |i| energies.energy(&self.triangles[i]) > 0.0);
         let sending: Vec<u32> = (0..).zip(sends).filter_map(|(i, sends)| sends.then_some(i)).collect();
         if sending.len() > MAX_LEAVES {
             return Err(Error(ErrorKind::TooMany { what: "light triangles", count: sending.len(), limit: MAX_LEAVES }));
         }
-        let total = emission.total(&self.triangles);
-        let bounds = |light: u32| emission.bounds(&self.triangles[sending[light as usize] as usize], total).0;
+        let total = energies.total(&self.triangles);
+        let bounds = |light: u32| energies.bounds(&self.triangles[sending[light as usize] as usize], total).0;
         let cancelled = |_| Error(ErrorKind::Cancelled);
         let (tlas, order) = tlas::build::<N>(sending.len(), &bounds, report).map_err(cancelled)?;
         let places = parallel::collect(order.len(), |leaf| sending[order[leaf] as usize]);
@@ -187,15 +187,14 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         }
     }
 
-    fn add_triangle(&mut self, mesh_number: u32, number: u32, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<(), Error> {
+    fn add_triangle(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<(), Error> {
         let root = self.root(mesh, indices)?;
         let two_sided = if mesh.sides == Sides::Two { LightTriangle::TWO_SIDED } else { 0 };
         let portal = if mesh.kind == Kind::Portal { LightTriangle::PORTAL } else { 0 };
         let triangle = LightTriangle {
             vertices: indices.map(|index| mesh.positions[index as usize].to_array()),
-            id: [mesh_number, number],
             root,
-            flags: two_sided | portal,
+            place_and_flags: self.places.len() as u32 | two_sided | portal,
         };
         if root.average == 0.0 {
             self.places.push(NO_LEAF);
@@ -220,7 +219,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         if let Some(&root) = self.shared.get(&key) {
             return Ok(root);
         }
-        let root = blas::build(&self.textures[texture], uvs, &mut self.cells)?;
+        let root = blas::build(&mut self.textures[texture], uvs, &mut self.cells)?;
         self.shared.insert(key, root);
         Ok(root)
     }

@@ -154,7 +154,8 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
         let roots: Vec<blas::Root> = self.triangles.iter().map(|triangle| triangle.root).collect();
         blas::validate_roots(&roots, self.cells)?;
         self.triangles.iter().enumerate().try_for_each(|(i, triangle)| {
-            if triangle.is_valid() { Ok(()) } else { Err(Error::bytes("triangle", i, triangle.flags, 0u64)) }
+            let valid = triangle.is_valid() && (triangle.place() as usize) < self.leaves.len();
+            if valid { Ok(()) } else { Err(Error::bytes("triangle", i, triangle.place(), self.leaves.len())) }
         })?;
         let leaf_count = self.triangles.len() as u32;
         let bad_leaf = self.leaves.iter().position(|&leaf| leaf < NO_AREA && leaf >= leaf_count);

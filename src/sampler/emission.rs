@@ -60,7 +60,7 @@ struct Everywhere;
 impl Shape for Everywhere {
     #[inline]
     fn worth(&self, _cell: &Cell) -> Worth {
-        Worth { weight: 1.0, uniform: true }
+        Worth { weight: 1.0, uniform: true, even: true }
     }
 }
 
@@ -246,10 +246,7 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
 
     fn ray(&self, leaf: u32, start: &Start, direction: Vec3, pdf: f64, pmf: f64) -> EmissionSample {
         EmissionSample {
-            hit: Hit {
-                triangle: self.lights.triangles[leaf as usize].id(),
-                barycentrics: start.place.to_barycentrics(),
-            },
+            hit: Hit { triangle: self.lights.id(leaf), barycentrics: start.place.to_barycentrics() },
             position: start.position.as_vec3(),
             normal: start.normal,
             direction,

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::mesh::mesh_of;
 use crate::bounds::{LightBounds, Moments};
 use crate::env::Environment;
 use crate::geometry::{Aabb, Cone};
@@ -12,19 +13,29 @@ use crate::parallel;
 const LEAST_ENERGY: f64 = 1e-30;
 
 /// What the energy of a triangle depends on besides itself.
-pub(super) struct Emission<'a> {
+pub(super) struct Energies<'a> {
     /// Mean radiance that portals show.
     mean: f64,
     /// Whether what portals show depends on the direction.
     directional: bool,
-    /// See [`scale_of`].
-    scales: &'a [f32],
+    scales: Scales<'a>,
 }
 
-/// What the weights of a light's mesh are multiplied by since the build; without entries, nothing.
-#[inline]
-pub(super) fn scale_of(scales: &[f32], light: &LightTriangle) -> f32 {
-    scales.get(light.id[0] as usize).copied().unwrap_or(1.0)
+/// What the weights of each mesh are multiplied by since the build; without factors, nothing.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Scales<'a> {
+    pub(super) factors: &'a [f32],
+    pub(super) meshes: &'a [u32],
+}
+
+impl Scales<'_> {
+    #[inline]
+    pub(super) fn of(&self, light: &LightTriangle) -> f32 {
+        if self.factors.is_empty() {
+            return 1.0;
+        }
+        self.factors.get(mesh_of(self.meshes, light.place())).copied().unwrap_or(1.0)
+    }
 }
 
 /// An energy in single precision, zero only if it is zero.
@@ -32,8 +43,8 @@ pub(super) fn storable(energy: f64) -> f32 {
     if energy > 0.0 { energy.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32 } else { 0.0 }
 }
 
-impl<'a> Emission<'a> {
-    pub(super) fn new(environment: &Environment, scales: &'a [f32]) -> Self {
+impl<'a> Energies<'a> {
+    pub(super) fn new(environment: &Environment, scales: Scales<'a>) -> Self {
         Self { mean: f64::from(environment.mean_without_suns()), directional: !environment.is_constant(), scales }
     }
 
@@ -51,7 +62,7 @@ impl<'a> Emission<'a> {
 
     fn energy_of(&self, light: &LightTriangle, area: f32) -> f64 {
         let radiance = if light.is_portal() { self.mean } else { 1.0 };
-        let weight = f64::from(light.root.average) * f64::from(scale_of(self.scales, light));
+        let weight = f64::from(light.root.average) * f64::from(self.scales.of(light));
         weight * f64::from(area) * radiance
     }
 

@@ -5,7 +5,8 @@ use alloc::vec::Vec;
 use glam::Vec3;
 
 use super::builder::LightSamplerBuilder;
-use super::energy::scale_of;
+use super::energy::Scales;
+use super::mesh::mesh_of;
 use crate::blas;
 use crate::env::{Environment, EnvironmentView, Footprint};
 use crate::light::{Illumination, LightTriangle, Lit};
@@ -27,7 +28,7 @@ pub struct LightSampler<const N: usize = 8, const M: usize = 4> {
     pub(super) tlas: Tlas<N>,
     /// In the order of the tree's leaves.
     pub(super) triangles: Vec<LightTriangle>,
-    pub(super) cells: Vec<blas::Node<M>>,
+    pub(super) cells: Vec<blas::Block<M>>,
     /// Where the triangles of each mesh start in `leaves`, and their number at the end.
     pub(super) meshes: Vec<u32>,
     /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`].
@@ -51,7 +52,7 @@ pub struct LightSampler<const N: usize = 8, const M: usize = 4> {
 pub struct LightSamplerView<'a, const N: usize = 8, const M: usize = 4> {
     pub(super) tlas: TlasView<'a, N>,
     pub(super) triangles: &'a [LightTriangle],
-    pub(super) cells: &'a [blas::Node<M>],
+    pub(super) cells: &'a [blas::Block<M>],
     pub(super) meshes: &'a [u32],
     pub(super) leaves: &'a [u32],
     pub(super) scales: &'a [f32],
@@ -141,15 +142,27 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
         self.leaves.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
     }
 
+    /// The triangle in a leaf.
+    pub(super) fn id(&self, leaf: u32) -> TriangleId {
+        let place = self.triangles[leaf as usize].place();
+        let mesh = mesh_of(self.meshes, place);
+        TriangleId { mesh: mesh as u32, triangle: place.wrapping_sub(self.meshes[mesh]) }
+    }
+
     /// What the weight of a triangle is multiplied by.
     #[inline]
     pub(super) fn scale(&self, light: &LightTriangle) -> f32 {
-        scale_of(self.scales, light)
+        Scales { factors: self.scales, meshes: self.meshes }.of(light)
     }
 
     /// A triangle as seen from a shading point; `None` if nothing can arrive from it.
     pub(super) fn lit(&self, leaf: u32, x: &ShadingPoint) -> Option<Lit<'a>> {
         Lit::new(&self.triangles[leaf as usize], x, self.illumination, self.directional_environment())
+    }
+
+    /// Whether anything is sent at all.
+    pub(super) fn sends(&self) -> bool {
+        self.energy > 0.0
     }
 
     pub(super) fn has_portals(&self) -> bool {
@@ -163,7 +176,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 
     /// What the tree over triangles asks for at a shading point.
     pub(super) fn scene<'s>(&'s self, x: &'s ShadingPoint) -> Scene<'s> {
-        Scene { x, triangles: self.triangles, environment: self.environment, sends: self.energy > 0.0 }
+        Scene { x, triangles: self.triangles, environment: &self.environment, sends: self.sends() }
     }
 }
 
@@ -171,7 +184,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 pub(super) struct Scene<'a> {
     x: &'a ShadingPoint,
     triangles: &'a [LightTriangle],
-    environment: EnvironmentView<'a>,
+    environment: &'a EnvironmentView<'a>,
     /// Whether any triangle sends anything.
     sends: bool,
 }

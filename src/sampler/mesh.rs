@@ -99,3 +99,44 @@ pub(super) fn check_triangles(mesh: usize, positions: &[Vec3], indices: &[[u32; 
     }
     Ok(())
 }
+
+/// The mesh that holds a triangle, by the numbers at which the meshes start (and, at last, the one at which they end).
+pub(super) fn mesh_of(starts: &[u32], place: u32) -> usize {
+    let last = starts.len().saturating_sub(2);
+    let total = starts.last().map_or(1, |&end| u64::from(end.max(1)));
+    // Meshes are often of like sizes: look around the place where it would be if all were.
+    let guess = ((u64::from(place) * (last as u64 + 1) / total) as usize).min(last);
+    let (mut low, mut high, mut reach) = (guess, guess + 1, 1);
+    while low > 0 && starts[low] > place {
+        low = low.saturating_sub(reach);
+        reach *= 2;
+    }
+    while high <= last && starts[high] <= place {
+        high = (high + reach).min(last + 1);
+        reach *= 2;
+    }
+    (low + starts[low..high].partition_point(|&start| start <= place)).saturating_sub(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mesh_of;
+    use crate::testing::Pcg32;
+    use alloc::vec::Vec;
+
+    #[test]
+    fn every_triangle_is_in_its_mesh() {
+        let mut pcg = Pcg32::new(1, 51);
+        for round in 0..200 {
+            // Meshes of all sizes, and empty ones.
+            let mut starts = Vec::from([0]);
+            for _ in 0..1 + pcg.below(60) {
+                let size = pcg.below(1 << (round % 9)) * pcg.below(2);
+                starts.push(starts[starts.len() - 1] + size);
+            }
+            for mesh in 0..starts.len() - 1 {
+                (starts[mesh]..starts[mesh + 1]).for_each(|place| assert_eq!(mesh_of(&starts, place), mesh));
+            }
+        }
+    }
+}

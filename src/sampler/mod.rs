@@ -8,12 +8,14 @@ mod emission;
 mod energy;
 mod forward;
 mod lights;
+mod many;
 mod mesh;
 mod pdf;
 mod refit;
 mod sample;
 mod split;
 mod suns;
+mod techniques;
 
 pub use at::PointSampler;
 pub use builder::LightSamplerBuilder;

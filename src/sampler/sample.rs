@@ -1,7 +1,7 @@
 //! A point on the lights for a shading point.
 
 use super::at::PointSampler;
-use super::suns::Technique;
+use super::techniques::Technique;
 use crate::blas::{self, Draw, Lattice};
 use crate::light::Lit;
 use crate::record::{Hit, LightSample};
@@ -15,13 +15,11 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// `None` where nothing can arrive from the part of the lights that `u` leads to; such a `u` counts as a sample
     /// of zero. The densities of all points integrate to the probability of not getting `None`.
     pub fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
-        let salt = seed(&u);
-        let mut choice = Variate::new(u[0], salt);
-        let point = [Variate::new(u[1], salt ^ 1), Variate::new(u[2], salt ^ 2)];
+        let [mut choice, point @ ..] = variates(u);
         match self.techniques.choose(&mut choice) {
             Technique::Sun(sun) => self.sample_sun(sun, point, None),
             Technique::Trees => {
-                let (leaf, pmf) = self.lights.tlas.sample(&self.x, &self.lights.scene(&self.x), &mut choice)?;
+                let (leaf, pmf) = self.lights.tlas.sample(&self.x, &self.lights.scene(&self.x), choice)?;
                 self.sample_on(leaf, pmf, point)
             }
         }
@@ -55,10 +53,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
         let distance = relative.length();
         let positive = pdf > 0.0 && distance > 0.0 && distance.is_finite();
         positive.then(|| LightSample {
-            hit: Hit {
-                triangle: self.lights.triangles[drawn.leaf as usize].id(),
-                barycentrics: drawn.place.to_barycentrics(),
-            },
+            hit: Hit { triangle: self.lights.id(drawn.leaf), barycentrics: drawn.place.to_barycentrics() },
             position: (self.x.position.as_dvec3() + relative).as_vec3(),
             normal: lit.normal,
             direction: (relative / distance).as_vec3(),
@@ -74,6 +69,12 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     pub(super) fn mixed_pdf(&self, drawn: &Drawn, lit: &Lit<'_>) -> f64 {
         self.techniques.trees * drawn.tree_pdf + self.sun_pdf(drawn.leaf, drawn.place, lit)
     }
+}
+
+/// For the triangle, and for the point on it.
+pub(super) fn variates(u: [f32; 3]) -> [Variate; 3] {
+    let salt = seed(&u);
+    [Variate::new(u[0], salt), Variate::new(u[1], salt ^ 1), Variate::new(u[2], salt ^ 2)]
 }
 
 /// A point on a light, and its density by the trees alone.
@@ -94,7 +95,7 @@ pub(super) fn pdf_area(lit: &Lit<'_>, cell: &blas::Cell, cell_pmf: f64) -> f64 {
 
 /// Density per solid angle, on a triangle that is chosen, of a given point.
 pub(super) fn follow<const M: usize>(
-    cells: &[blas::Node<M>],
+    cells: &[blas::Block<M>],
     root: blas::Root,
     lit: &Lit<'_>,
     place: Lattice,

@@ -10,111 +10,14 @@ use glam::Vec3;
 
 use super::at::PointSampler;
 use super::lights::LightSamplerView;
+use super::techniques::{ANY, MAX_SEEN, Seen, Techniques};
 use crate::blas::{self, Lattice, Shape};
-use crate::env::{MAX_SUNS, Sun};
+use crate::env::Sun;
 use crate::geometry;
-use crate::light::{Lit, Part, Sunlit};
+use crate::light::{Lit, Sunlit};
 use crate::math;
 use crate::record::{Receiver, ShadingPoint};
-use crate::warp::{Variate, pick, pick_pair, sum};
-
-/// Most pairs of a sun and a portal triangle that shows some of it. Of a sun with more, directions are drawn as if
-/// there were no walls.
-const MAX_SEEN: usize = 64;
-const _: () = assert!(MAX_SEEN > MAX_SUNS);
-
-/// Stands for all portals.
-const ANY: u32 = u32::MAX;
-/// Least probability of the trees where they may find anything.
-const LEAST_TREES: f32 = 0.02;
-/// Largest estimate of an irradiance, so that sums stay finite.
-const BRIGHTEST: f32 = 1e35;
-
-/// A sun through a portal.
-#[derive(Clone, Copy, Debug)]
-struct Seen {
-    /// Or [`ANY`].
-    leaf: u32,
-    sun: u32,
-    part: Part,
-}
-
-/// How often each technique is used at one shading point.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Techniques {
-    seen: [Seen; MAX_SEEN],
-    /// Irradiance from each.
-    weights: [f32; MAX_SEEN],
-    count: usize,
-    /// Irradiance from the trees.
-    rest: f32,
-    /// Probability of the trees; 1 if they are used anyway.
-    pub(super) trees: f64,
-    /// Probability of a sun through a portal per weight; 0 if none is seen.
-    per_weight: f64,
-}
-
-/// A technique that was chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Technique {
-    Trees,
-    /// By its place in the list.
-    Sun(usize),
-}
-
-impl Techniques {
-    /// The trees alone.
-    const TREES: Self = Self {
-        seen: [Seen { leaf: 0, sun: 0, part: Part::WHOLE }; MAX_SEEN],
-        weights: [0.0; MAX_SEEN],
-        count: 0,
-        rest: 1.0,
-        trees: 1.0,
-        per_weight: 0.0,
-    };
-
-    /// Whether no sun is seen.
-    #[inline]
-    pub(super) fn is_trees(&self) -> bool {
-        self.per_weight == 0.0
-    }
-
-    fn weights(&self) -> &[f32] {
-        &self.weights[..self.count]
-    }
-
-    /// Chooses one technique.
-    #[inline]
-    pub(super) fn choose(&self, u: &mut Variate) -> Technique {
-        if self.is_trees() {
-            return Technique::Trees;
-        }
-        let suns = sum(self.weights());
-        match pick_pair([suns as f32, self.rest], u) {
-            0 => Technique::Sun(pick(self.weights(), suns, u)),
-            _ => Technique::Trees,
-        }
-    }
-
-    /// The trees in any case, and one of the suns next to them.
-    pub(super) fn side_by_side(self) -> Self {
-        if self.is_trees() {
-            return self;
-        }
-        Self { trees: 1.0, per_weight: 1.0 / sum(self.weights()), ..self }
-    }
-
-    /// Chooses among the suns alone, if any is seen.
-    pub(super) fn choose_sun(&self, u: &mut Variate) -> Option<usize> {
-        (!self.is_trees()).then(|| pick(self.weights(), sum(self.weights()), u))
-    }
-
-    fn push(&mut self, leaf: u32, sun: usize, part: Part, weight: f32) {
-        self.seen[self.count] = Seen { leaf, sun: sun as u32, part };
-        self.weights[self.count] = weight;
-        self.count += 1;
-    }
-}
+use crate::warp::Variate;
 
 impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     /// What each technique is worth at a shading point.
@@ -131,14 +34,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         for sun in 0..self.environment.suns().len() {
             self.find(sun, x, &mut techniques);
         }
-        let suns = sum(techniques.weights()) as f32;
-        if !(suns > 0.0 && suns < BRIGHTEST) {
-            return Techniques::TREES;
-        }
-        let trees = self.irradiance_by_trees(x);
-        techniques.rest = if trees > 0.0 { trees.max(LEAST_TREES * suns).min(BRIGHTEST) } else { 0.0 };
-        let total = f64::from(suns) + f64::from(techniques.rest);
-        Techniques { trees: f64::from(techniques.rest) / total, per_weight: 1.0 / total, ..techniques }
+        techniques.balance(|| self.irradiance_by_trees(x))
     }
 
     /// Estimate of the irradiance from all that the trees hold. Zero only if there is none.
@@ -158,7 +54,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         if cosine == 0.0 {
             return;
         }
-        let start = techniques.count;
+        let start = techniques.len();
         // Every sun after this one keeps a place.
         let end = MAX_SEEN - (self.environment.suns().len() - 1 - sun);
         let mut more = 0.0;
@@ -175,7 +71,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             }
             let Some(lit) = self.lit(leaf, x) else { return };
             self.sunlit(&lit, sun).visit(self.cells, light.root, &mut |part, through| {
-                if techniques.count < end {
+                if techniques.len() < end {
                     techniques.push(leaf, sun, part, through * scale * cosine);
                 } else {
                     more += 1.0;
@@ -183,14 +79,12 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             });
         });
         if more > 0.0 {
-            let found = &techniques.weights[start..end];
-            let all = sum(found) as f32 * (1.0 + more / found.len() as f32);
-            techniques.count = start;
-            techniques.push(ANY, sun, Part::WHOLE, all.min(power * cosine));
+            let all = techniques.irradiance(start) * (1.0 + more / (end - start) as f32);
+            techniques.merge(start, sun, all.min(power * cosine));
         }
     }
 
-    pub(super) fn sunlit<'s>(&'s self, lit: &'s Lit<'s>, sun: usize) -> Sunlit<'s> {
+    fn sunlit<'s>(&'s self, lit: &'s Lit<'s>, sun: usize) -> Sunlit<'s> {
         Sunlit { lit, environment: self.environment, sun }
     }
 
@@ -217,7 +111,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
 impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Draws a point on a portal towards a sun, by its place in the list.
     pub(super) fn sun_point(&self, index: usize, u: [Variate; 2]) -> Option<(u32, Lattice)> {
-        let Seen { leaf, sun, part } = self.techniques.seen[index];
+        let Seen { leaf, sun, part } = self.techniques.seen(index);
         let (lights, sun) = (&self.lights, sun as usize);
         if leaf == ANY {
             return lights.least_crossed(&self.x, lights.environment.sample_sun(sun, u));
@@ -233,19 +127,20 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
             return 0.0;
         }
         let direction = lit.point(place).normalize_or_zero().as_vec3();
-        let pairs = self.techniques.seen.iter().zip(self.techniques.weights());
-        let term = |(&seen, &weight): (&Seen, &f32)| {
-            if seen.leaf != ANY && (seen.leaf != leaf || !seen.part.domain.holds(place)) {
-                return 0.0;
+        let environment = &self.lights.environment;
+        let mut pdf = 0.0;
+        for sun in 0..environment.suns().len() {
+            let excess = f64::from(environment.sun_excess(sun, direction));
+            if excess == 0.0 {
+                continue;
             }
-            match self.lights.environment.sun_excess(seen.sun as usize, direction) {
-                0.0 => 0.0,
-                excess => {
-                    f64::from(weight) * f64::from(excess) * self.sun_pdf_per_excess(seen, leaf, place, lit, direction)
+            for (seen, weight) in self.techniques.of_sun(sun) {
+                if seen.leaf == ANY || (seen.leaf == leaf && seen.part.domain.holds(place)) {
+                    pdf += f64::from(weight) * excess * self.sun_pdf_per_excess(seen, leaf, place, lit, direction);
                 }
             }
-        };
-        self.techniques.per_weight * pairs.map(term).sum::<f64>()
+        }
+        self.techniques.per_weight * pdf
     }
 
     /// Density per solid angle of a point of a portal by one sun, over the sun's excess there.

@@ -4,7 +4,8 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::bins::{Extent, Item};
+use super::bins::Extent;
+use super::cluster::Item;
 use super::collapse::collapse;
 use super::node::Tlas;
 

@@ -6,9 +6,9 @@ use super::build::BinaryNode;
 use super::forest::{Cut, forests};
 use super::node::{Node, Slot, Spread, Tlas};
 
-/// Collapses a binary tree. Returns the wide tree, whose nodes have no bounds yet, with the lights in the order of its leaves, which follows the
-/// tree, so that the lights of one node are neighbours in memory. So are the nodes below one node; and what is below
-/// the first of them comes before what is below the second.
+/// Collapses a binary tree. Returns the wide tree, whose nodes have no bounds yet, with the lights in the order of its
+/// leaves, which follows the tree, so that the lights of one node are neighbours in memory. So are the nodes below one
+/// node; and what is below the first of them comes before what is below the second.
 pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u32>) {
     let mut tlas = Tlas { nodes: Vec::new(), parents: Vec::new(), spreads: Vec::new(), leaves: Vec::new() };
     let mut lights = Vec::with_capacity(binary.len() / 2 + 1);

@@ -3,35 +3,90 @@
 use super::importance::{Scene, Sight};
 use super::node::{Child, Node, TlasView};
 use crate::record::ShadingPoint;
-use crate::simd::{Level, Work};
+use crate::simd::{Level, Work, prefetch};
 use crate::warp::{Variate, pick_wide, pmf_wide};
 
-/// The way down to a leaf.
+/// A way down the tree, as far as it has got.
+pub(crate) struct Walk<S> {
+    sight: Sight,
+    scene: S,
+    u: Variate,
+    node: u32,
+    /// Probability of getting here.
+    pmf: f64,
+    /// Where it ended: in a leaf, or with nothing.
+    end: Option<Option<u32>>,
+}
+
+impl<S: Scene> Walk<S> {
+    /// From the root.
+    #[inline(always)]
+    pub(crate) fn new(x: &ShadingPoint, scene: S, u: Variate) -> Self {
+        Self { sight: Sight::new(x), scene, u, node: 0, pmf: 1.0, end: None }
+    }
+
+    /// The leaf that was drawn, with its probability.
+    #[inline(always)]
+    pub(crate) fn leaf(&self) -> Option<(u32, f64)> {
+        self.end.flatten().map(|leaf| (leaf, self.pmf))
+    }
+
+    /// Goes on to a child, unless this is the end.
+    #[inline(always)]
+    fn step<const N: usize>(&mut self, tlas: &TlasView<'_, N>) {
+        let node = &tlas.nodes[self.node as usize];
+        let weights = node.weights(&self.sight, &self.scene);
+        let Some((lane, share)) = pick_wide(&weights, &mut self.u) else {
+            self.end = Some(None);
+            return;
+        };
+        self.pmf *= share;
+        match node.child(lane) {
+            Child::Node(index) => self.node = index,
+            Child::Leaf(leaf) => self.end = Some(Some(leaf)),
+            Child::Empty => self.end = Some(None),
+        }
+    }
+}
+
+/// One way down to a leaf.
 pub(super) struct Draw<'a, const N: usize, S> {
     pub(super) tlas: &'a TlasView<'a, N>,
-    /// Where it begins.
-    pub(super) node: usize,
-    pub(super) x: &'a ShadingPoint,
-    pub(super) scene: &'a S,
-    pub(super) u: &'a mut Variate,
+    pub(super) walk: Walk<S>,
 }
 
 impl<const N: usize, S: Scene> Work for Draw<'_, N, S> {
     type Output = Option<(u32, f64)>;
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
-        let sight = Sight::new(self.x);
-        let mut node = self.node;
-        let mut pmf = 1.0;
-        loop {
-            let weights = self.tlas.nodes[node].weights(&sight, self.scene);
-            let (lane, share) = pick_wide(&weights, self.u)?;
-            pmf *= share;
-            match self.tlas.nodes[node].child(lane) {
-                Child::Node(index) => node = index as usize,
-                Child::Leaf(leaf) => return Some((leaf, pmf)),
-                Child::Empty => return None,
+    fn run(mut self) -> Self::Output {
+        while self.walk.end.is_none() {
+            self.walk.step(self.tlas);
+        }
+        self.walk.leaf()
+    }
+}
+
+/// Several ways down, one step each in turn: while one waits for memory and for sums, the others go on.
+struct DrawMany<'a, const N: usize, S> {
+    tlas: &'a TlasView<'a, N>,
+    walks: &'a mut [Walk<S>],
+}
+
+impl<const N: usize, S: Scene> Work for DrawMany<'_, N, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let mut going = true;
+        while going {
+            going = false;
+            for walk in &mut *self.walks {
+                if walk.end.is_none() {
+                    walk.step(self.tlas);
+                    prefetch(&self.tlas.nodes[walk.node as usize]);
+                    going = true;
+                }
             }
         }
     }
@@ -50,9 +105,15 @@ impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
 
     #[inline(always)]
     fn run(self) -> f64 {
+        // The way is short to find, but its nodes are far apart in memory.
+        self.tlas.path(self.leaf).for_each(|(node, _)| prefetch(&self.tlas.nodes[node]));
         let sight = Sight::new(self.x);
-        let share = |(node, lane): (usize, usize)| pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane);
-        self.tlas.path(self.leaf).map(share).product()
+        let mut pmf = 1.0;
+        // Not a fold, whose closure would be compiled for the baseline.
+        for (node, lane) in self.tlas.path(self.leaf) {
+            pmf *= pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane);
+        }
+        pmf
     }
 }
 
@@ -82,7 +143,7 @@ impl<const N: usize> Node<N> {
 impl<const N: usize> TlasView<'_, N> {
     /// Draws a leaf. Returns it with its probability; `None` where nothing can arrive from the part of the tree
     /// that `u` leads to.
-    pub(crate) fn sample(&self, x: &ShadingPoint, scene: &impl Scene, u: &mut Variate) -> Option<(u32, f64)> {
+    pub(crate) fn sample(&self, x: &ShadingPoint, scene: &impl Scene, u: Variate) -> Option<(u32, f64)> {
         if self.nodes.is_empty() {
             return self.single_leaf(scene).then_some((0, 1.0));
         }
@@ -95,9 +156,21 @@ impl<const N: usize> TlasView<'_, N> {
         node: usize,
         x: &ShadingPoint,
         scene: &impl Scene,
-        u: &mut Variate,
+        u: Variate,
     ) -> Option<(u32, f64)> {
-        Level::best().run(Draw { tlas: self, node, x, scene, u })
+        let walk = Walk { node: node as u32, ..Walk::new(x, scene, u) };
+        Level::best().run(Draw { tlas: self, walk })
+    }
+
+    /// As many calls of [`Self::sample`], of which each walk then holds what was drawn.
+    pub(crate) fn sample_many(&self, walks: &mut [Walk<impl Scene>]) {
+        if self.nodes.is_empty() {
+            for walk in walks {
+                walk.end = Some(self.single_leaf(&walk.scene).then_some(0));
+            }
+            return;
+        }
+        Level::best().run(DrawMany { tlas: self, walks });
     }
 
     /// Probability with which [`Self::sample`] draws a leaf.

@@ -108,3 +108,6 @@ fn nearest(value: f32) -> u16 {
     let bits = (value.to_bits() + 0x8000) >> 16;
     (bits as u16).clamp(1, 0x7f7f)
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,11 +8,12 @@ use super::node::{Child, Node, Spread, Tlas};
 use crate::bounds::{LightBounds, Moments};
 use crate::parallel;
 
-/// A node and all nodes below it: its children are neighbours, behind them is what lies below the first of them, and so
-/// on.
+/// A node and all nodes below it, which are neighbours in memory.
 struct Subtree<'a, const N: usize> {
-    root: &'a mut Node<N>,
+    node: &'a mut Node<N>,
     spread: &'a mut Spread,
+    /// Number of the first node below.
+    first: usize,
     below: &'a mut [Node<N>],
     spreads: &'a mut [Spread],
     fitted: Fitted,
@@ -37,7 +38,7 @@ impl<const N: usize> Tlas<N> {
     pub(crate) fn fit(&mut self, light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync)) -> f64 {
         let [node, below @ ..] = &mut self.nodes[..] else { return 1.0 };
         let [spread, spreads @ ..] = &mut self.spreads[..] else { return 1.0 };
-        let root = Subtree { root: node, spread, below, spreads, fitted: Fitted::NONE }.fit(light);
+        let root = Subtree { node, spread, first: 1, below, spreads, fitted: Fitted::NONE }.fit(light);
         if root.sum > 0.0 {
             let scale = 1.0 / root.sum;
             self.spreads.iter_mut().for_each(|spread| spread.scale(scale));
@@ -48,59 +49,55 @@ impl<const N: usize> Tlas<N> {
 }
 
 impl<const N: usize> Subtree<'_, N> {
-    fn fit(self, light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync)) -> Fitted {
-        let Self { root, spread, below, spreads, .. } = self;
-        let count = below.len();
-        let mut subtrees = divide(root, below, spreads);
-        parallel::for_each(&mut subtrees, count, |subtree| subtree.fitted = subtree.take().fit(light));
-        let mut whole = Fitted::NONE;
-        let mut known: SmallVec<[(LightBounds, Moments); 16]> = SmallVec::new();
-        for lane in 0..N {
-            let fitted = match root.child(lane) {
-                Child::Empty => break,
-                Child::Leaf(leaf) => Fitted::leaf(light(leaf)),
-                Child::Node(_) => subtrees[lane].fitted,
-            };
-            known.push((fitted.bounds, fitted.moments));
-            whole = if lane == 0 { fitted } else { whole.union(&fitted) };
-            whole.cost += fitted.bounds.cost();
-        }
-        root.set(&known);
-        *spread = whole.spread();
-        whole
-    }
-
-    /// The same, with nothing left behind.
-    fn take(&mut self) -> Subtree<'_, N> {
-        let Self { root, spread, below, spreads, fitted } = self;
-        Subtree { root, spread, below, spreads, fitted: *fitted }
+    fn fit(&mut self, light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync)) -> Fitted {
+        let mut subtrees = divide(self.node, self.first, self.below, self.spreads);
+        let size = subtrees.iter().map(|subtree| 1 + subtree.below.len()).sum();
+        parallel::for_each(&mut subtrees, size, |subtree| subtree.fitted = subtree.fit(light));
+        let mut subtrees = subtrees.iter();
+        let lanes: SmallVec<[Fitted; 16]> = (0..N)
+            .filter_map(|lane| match self.node.child(lane) {
+                Child::Empty => None,
+                Child::Leaf(leaf) => Some(Fitted::leaf(light(leaf))),
+                Child::Node(_) => subtrees.next().map(|subtree| subtree.fitted),
+            })
+            .collect();
+        let known: SmallVec<[_; 16]> = lanes.iter().map(|lane| (lane.bounds, lane.moments)).collect();
+        self.node.set(&known);
+        let whole = lanes.iter().copied().reduce(|whole, lane| whole.union(&lane)).unwrap_or(Fitted::NONE);
+        *self.spread = whole.spread();
+        let cost = whole.cost + lanes.iter().map(|lane| lane.bounds.cost()).sum::<f64>();
+        Fitted { cost, ..whole }
     }
 }
 
-/// The subtrees below a node, of all nodes below it.
+/// The subtrees below a node. Its child nodes come first, then what is below the first of them, and so on.
 fn divide<'a, const N: usize>(
     node: &Node<N>,
-    below: &'a mut [Node<N>],
+    first: usize,
+    nodes: &'a mut [Node<N>],
     spreads: &'a mut [Spread],
 ) -> SmallVec<[Subtree<'a, N>; 16]> {
-    let count = usize::from(node.node_count);
-    let first = node.first_node as usize;
-    let end = first + below.len();
-    let (roots, mut below) = below.split_at_mut(count);
-    let (root_spreads, mut spreads) = spreads.split_at_mut(count);
-    // Where the nodes below each child begin: where those below the next one that has any do, for one without.
-    let mut starts = [end; 17];
-    for lane in (0..count).rev() {
-        let root = &roots[lane];
-        starts[lane] = if root.node_count > 0 { root.first_node as usize } else { starts[lane + 1] };
+    let end = first + nodes.len();
+    let children = usize::from(node.node_count);
+    let (nodes, mut below) = nodes.split_at_mut(children);
+    let (own_spreads, mut spreads) = spreads.split_at_mut(children);
+    // Where the nodes below each child begin; those of the last one end with the slice.
+    let mut starts = [end; N];
+    let mut next = end;
+    for (start, child) in starts.iter_mut().zip(nodes.iter()).rev() {
+        next = if child.node_count > 0 { child.first_node as usize } else { next };
+        *start = next;
     }
-    let cut = |((lane, root), spread): ((usize, &'a mut Node<N>), &'a mut Spread)| {
-        let size = starts[lane + 1] - starts[lane];
-        let own_nodes = below.split_off_mut(..size).unwrap_or_default();
-        let own_spreads = spreads.split_off_mut(..size).unwrap_or_default();
-        Subtree { root, spread, below: own_nodes, spreads: own_spreads, fitted: Fitted::NONE }
-    };
-    roots.iter_mut().enumerate().zip(root_spreads).map(cut).collect()
+    let mut subtrees = SmallVec::new();
+    for (i, (node, spread)) in nodes.iter_mut().zip(own_spreads).enumerate() {
+        let first = starts[i];
+        let count = starts.get(i + 1).copied().unwrap_or(end) - first;
+        let (mine, others) = below.split_at_mut(count);
+        let (mine_spreads, other_spreads) = spreads.split_at_mut(count);
+        (below, spreads) = (others, other_spreads);
+        subtrees.push(Subtree { node, spread, first, below: mine, spreads: mine_spreads, fitted: Fitted::NONE });
+    }
+    subtrees
 }
 
 impl Fitted {

@@ -24,6 +24,18 @@ pub(crate) trait Scene {
     fn is_visible(&self, leaf: u32) -> bool;
 }
 
+impl<S: Scene> Scene for &S {
+    #[inline(always)]
+    fn radiance(&self, center: Vec3, radius: f32) -> f32 {
+        (**self).radiance(center, radius)
+    }
+
+    #[inline(always)]
+    fn is_visible(&self, leaf: u32) -> bool {
+        (**self).is_visible(leaf)
+    }
+}
+
 /// Least expected cosine of a cluster that is not culled.
 const LEAST_COSINE: f32 = 1e-3;
 /// Relative error granted to the dot products that decide on culling.
@@ -57,6 +69,8 @@ pub(super) struct Sight {
     /// The normal of the horizon, and one for no horizon.
     horizon: Vec3,
     lift: f32,
+    /// Rounding granted to heights over the horizon, relative to distances.
+    slack: f32,
 }
 
 impl Sight {
@@ -69,7 +83,8 @@ impl Sight {
             Receiver::Transmissive(normal) => (normal, unsigned, LEAST_COSINE, Vec3::ZERO, 1.0),
             Receiver::Volume => (Vec3::ZERO, all, 1.0, Vec3::ZERO, 1.0),
         };
-        Self { position, normal, cosine_bits, least_cosine, horizon, lift }
+        let slack = ROUNDING * horizon.abs().element_sum();
+        Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack }
     }
 }
 
@@ -107,7 +122,9 @@ impl<const N: usize> Node<N> {
                 weights[lane] = 0.0;
             }
         }
-        self.look_through(x, scene, weights);
+        if { self.portals } != [0; N] {
+            self.look_through(x, scene, weights);
+        }
         weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()))
     }
 
@@ -145,20 +162,16 @@ impl<const N: usize> Node<N> {
 
             // The horizon, by the most and the least favourable corner of the box.
             let (height, reach) = (horizon.dot(center) + x.lift, absolute_horizon.dot(half));
-            let slack = ROUNDING * (absolute_horizon.dot(center.abs()) + reach);
-            let below = height + reach < -slack;
-            let straddles = !(height - reach > slack);
-
             // The emitters' side: the angle between the axis and the direction to any point of the box, by the box's
             // nearest corner along the axis and the ball around it across.
             let bits = normals[i];
             let axis = Vec3::new(Self::component(bits, 0), Self::component(bits, 1), Self::component(bits, 2));
             let (radius2, distance2) = (half.length_squared(), center.length_squared());
             let along = axis.dot(center);
-            let across = math::sqrt(at_least(distance2 - along * along, 0.0)) + math::sqrt(radius2);
+            let radius = math::sqrt(radius2);
+            let across = math::sqrt(at_least(distance2 - along * along, 0.0)) + radius;
             let root = f32::from(tangents[i]) * (1.0 / TANGENT_STEPS);
             let away = along - axis.abs().dot(half) > root * root * across;
-            let culled = below | (away & (tangents[i] != WIDE)) | (energies[i] == 0);
 
             // What arrives, by the moments.
             let mean = Vec3::new(f32::from(means[0][i]), f32::from(means[1][i]), f32::from(means[2][i]));
@@ -168,6 +181,10 @@ impl<const N: usize> Node<N> {
             let variance = deviation * deviation * radius2;
             let squared = at_least(to_mean.length_squared() + DISTANCE_SHARE * variance, LEAST_SQUARED);
             let (inverse2, distance) = (1.0 / squared, math::sqrt(squared));
+            // No point of the box is farther than this.
+            let slack = x.slack * (distance + 2.0 * radius);
+            let (below, straddles) = (height + reach < -slack, !(height - reach > slack));
+            let culled = below | (away & (tangents[i] != WIDE)) | (energies[i] == 0);
             let side = f32::from_bits(normal.dot(to_mean).to_bits() & x.cosine_bits);
             let receiver = at_least(clamped_mean(side, RECEIVER_SHARE * variance), x.least_cosine * distance);
             let facing = f32::from_bits((-length * axis.dot(to_mean)).to_bits() & !(bits & TWO_SIDED));

@@ -57,7 +57,7 @@ impl<const N: usize> TlasView<'_, N> {
             if arriving && depth < splitting.levels && self.is_split(node, x, &measure) {
                 weights = self.nodes[node].weigh(x, scene);
             } else if arriving {
-                if let Some((leaf, count)) = self.sample_below(node, x, scene, &mut variate(draws)) {
+                if let Some((leaf, count)) = self.sample_below(node, x, scene, variate(draws)) {
                     visit(leaf, count);
                 }
                 draws += 1;

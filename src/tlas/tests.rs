@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use glam::Vec3;
 
-use super::descend::{Draw, Follow};
+use super::descend::{Draw, Follow, Walk};
 use super::node::{Child, TlasView};
 use super::{Scene, Splitting, Tlas};
 use crate::bounds::{LightBounds, Moments};
@@ -17,7 +17,7 @@ use crate::warp::{Variate, seed};
 type Light = (LightBounds, Moments);
 
 /// The tree over lights, and the lights in the order of its leaves.
-fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
+pub(super) fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
     let (mut tlas, order) =
         super::build(lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
     tlas.fit(&|leaf| lights[order[leaf as usize] as usize]);
@@ -124,7 +124,7 @@ fn a_sample_has_the_probability_of_its_leaf() {
     for i in 0..20_000 {
         let x = shading_point(i, &mut pcg);
         let u = pcg.next_f32();
-        if let Some((leaf, pmf)) = view.sample(&x, &Odd, &mut Variate::new(u, seed(&[u]))) {
+        if let Some((leaf, pmf)) = view.sample(&x, &Odd, Variate::new(u, seed(&[u]))) {
             let again = view.pmf(leaf, &x, &Odd);
             assert!((pmf / again - 1.0).abs() < 1e-12, "leaf {leaf}: {pmf} {again}");
         }
@@ -155,10 +155,9 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let x = &ShadingPoint { position: x.position * scale, ..*x };
         let u = pcg.next_f32();
         let draw = |level: Level| {
-            let mut u = Variate::new(u, seed(&[u]));
-            let drawn = level.run(Draw { tlas, node: 0, x, scene: &Odd, u: &mut u });
+            let drawn = level.run(Draw { tlas, walk: Walk::new(x, &Odd, Variate::new(u, seed(&[u]))) });
             let pmf = drawn.map(|(leaf, _)| level.run(Follow { tlas, leaf, x, scene: &Odd }).to_bits());
-            (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), pmf, u.value().to_bits())
+            (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), pmf)
         };
         let mut all = Level::all().map(draw);
         let first = all.next();
@@ -297,7 +296,7 @@ fn broken_trees_are_refused() {
             Err(_) => refused += 1,
             Ok(()) => {
                 let x = shading_point(word, &mut pcg);
-                broken.view().sample(&x, &Open, &mut Variate::new(pcg.next_f32(), 1));
+                broken.view().sample(&x, &Open, Variate::new(pcg.next_f32(), 1));
                 broken.view().cross(x.position, Vec3::ONE, |_| ());
             }
         }

@@ -73,6 +73,6 @@ impl<const N: usize> Node<N> {
             && steps.iter().all(|&step| (0.0..=FAR).contains(&wide(step)))
             && energies
                 .map(|(lane, energy)| (lane < self.width.into(), energy))
-                .all(|(is_child, energy)| if is_child { energy > 0.0 && energy < f32::INFINITY } else { energy == 0.0 })
+                .all(|(is_child, energy)| if is_child { (0.0..f32::INFINITY).contains(&energy) } else { energy == 0.0 })
     }
 }

@@ -52,7 +52,8 @@ pub(crate) fn keep_least<const N: usize>(weights: &mut [f32; N], largest: u32) {
     }
 }
 
-/// The sums of all weights up to each, in the precision that a choice wants, and of zero and the one before the same.
+/// The sums of all weights up to each, in the precision that a choice wants. They never fall, and a weight of zero adds
+/// nothing.
 #[inline(always)]
 fn ends<const N: usize>(weights: &[f32; N]) -> [f64; N] {
     let mut ends = [0.0; N];
@@ -109,10 +110,15 @@ pub(crate) fn pick_wide<const N: usize>(weights: &[f32; N], variate: &mut Variat
         return None;
     }
     let target = variate.value() * total;
-    // A value below one leaves the target below the total, so that a weight is found, and never one of zero.
-    let passed: i64 = ends.iter().map(|&end| i64::from(target >= end)).sum();
-    let chosen = (passed as usize).min(N - 1);
-    let low = if chosen > 0 { ends[chosen - 1] } else { 0.0 };
+    // A value below one leaves the target below the total, so that a weight is found, and never one of zero. By halves:
+    // of as many weights as a power of two.
+    let (mut chosen, mut half) = (0, N / 2);
+    while half > 0 {
+        chosen += if target >= ends[chosen + half - 1] { half } else { 0 };
+        half /= 2;
+    }
+    // The end before, or zero: products with 0 and 1 are exact.
+    let low = ends[chosen.saturating_sub(1)] * f64::from(u8::from(chosen > 0));
     let width = f64::from(weights[chosen]);
     variate.stretch(target - low, width, total);
     Some((chosen, width / total))

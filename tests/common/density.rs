@@ -46,7 +46,7 @@ impl<'a> OnTriangle<'a> {
     }
 
     /// Integrals over the cells of a depth, in the order of [`bin`]. Cells are divided as long as the density differs
-    /// inside of them: between the middles of their quarters or at one of the `probes`. Probes only tell where to
+    /// inside of them: between the middles of their quarters, of the quarters of these, or at one of the `probes`. Probes only tell where to
     /// look closer; samples do well. Second, the most that cells which were too small to divide can be wrong by.
     pub(crate) fn integrate(&self, bin_depth: u32, least_depth: u32, probes: &[[f32; 2]]) -> (Vec<f64>, f64) {
         let mut bins = vec![0.0; 1 << (2 * bin_depth)];
@@ -73,7 +73,13 @@ impl Walk<'_, '_> {
         let quarters: [_; 4] = core::array::from_fn(|i| quarter(corners, i));
         if depth >= self.least_depth {
             let values = quarters.map(|q| self.on.density(middle(q)));
-            let all = || values.iter().copied().chain(probes.iter().map(|p| p.1));
+            // Averages are rounded, so that four can be the same by chance: then their quarters must be, too.
+            let mut parts = Vec::new();
+            if depth < DEEPEST && values.iter().all(|v| (v - values[0]).abs() <= 1e-4 * v) {
+                let of_quarter = |q| (0..4).map(move |i| middle(quarter(q, i)));
+                parts.extend(quarters.into_iter().flat_map(of_quarter).map(|b| self.on.density(b)));
+            }
+            let all = || values.iter().chain(&parts).copied().chain(probes.iter().map(|p| p.1));
             let (low, high) = all().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
             if high - low <= 1e-4 * high || depth >= DEEPEST {
                 let share = 0.25f64.powi(depth as i32);

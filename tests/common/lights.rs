@@ -17,7 +17,7 @@ pub(crate) trait Lights: Sync {
     fn pdf_split_direction(&self, x: &ShadingPoint, direction: Vec3, splitting: &Splitting) -> f32;
     fn sample_split(&self, x: &ShadingPoint, u: [f32; 3], splitting: &Splitting) -> SmallVec<[LightSample; 16]>;
     fn to_bytes(&self) -> Vec<u8>;
-    /// Samples of the same sampler after a round trip through bytes.
+    /// Samples of the same sampler after a round trip through bytes, all at once.
     fn sample_from_bytes(&self, points: &[(ShadingPoint, [f32; 3])]) -> Vec<Option<LightSample>>;
 }
 
@@ -63,7 +63,9 @@ impl<const N: usize, const M: usize> Lights for LightSampler<N, M> {
     fn sample_from_bytes(&self, points: &[(ShadingPoint, [f32; 3])]) -> Vec<Option<LightSample>> {
         let words = aligned(&self.to_bytes());
         let view = LightSamplerView::<N, M>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
-        points.iter().map(|(x, u)| view.sample(x, *u)).collect()
+        let mut samples = vec![None; points.len()];
+        view.sample_many(points, &mut samples);
+        samples
     }
 }
 

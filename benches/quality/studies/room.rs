@@ -52,17 +52,17 @@ fn curves(world: &World, window: &str, bounces: u32, effort: &Effort) -> Vec<Ser
     };
     let reference = render(Strategy::EnvironmentAndPortals, u32::MAX, REFERENCE * effort.seconds).0;
     let reference = Reference::from_film(&reference);
-    let mut series = vec![];
-    for (name, strategy) in STRATEGIES {
-        let mut marks = vec![];
-        for i in (0..effort.images).rev() {
+    let empty = |name: &str| Series { name: name.to_owned(), open: false, marks: vec![] };
+    let mut series = STRATEGIES.map(|(name, _)| empty(name));
+    // By turns, so that both have the machine to themselves as much.
+    for i in (0..effort.images).rev() {
+        for ((name, strategy), series) in STRATEGIES.into_iter().zip(&mut series) {
             let (film, seconds) = render(strategy, i + 1, effort.seconds * 0.5_f64.powi(i as i32));
             let error = reference.rel_mse(&film.image());
             let [at, spp, cost] = [seconds, f64::from(film.samples()), error * seconds].map(short);
             println!("{window:10} {bounces:>7} {name:32} {at:>8} {spp:>6} {:>9} {cost:>9}", short(error));
-            marks.push((seconds, error));
+            series.marks.push((seconds, error));
         }
-        series.push(Series { name: name.to_owned(), open: false, marks });
     }
-    series
+    series.into()
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use ::fanlight::{LightSample, ShadingPoint, Splitting};
 use smallvec::SmallVec;
 
-use crate::args::Args;
+use crate::args::{Args, Effort};
 use crate::comparison::truths;
 use crate::methods::Fanlight;
 use crate::metrics::{Summary, summary};
@@ -15,6 +15,7 @@ use crate::parallel::parallel;
 use crate::report::short;
 use crate::scenes::pcg::Pcg32;
 use crate::scenes::{self, Scene};
+use crate::timing::median;
 use crate::variance::contribution;
 
 const WORKLOADS: [&str; 3] = ["cloud-10000", "cloud-100000", "grid-100"];
@@ -39,38 +40,38 @@ pub(crate) fn run(args: &Args) {
         "\nSplitting: error x time of independent samples over that of as many by splitting (above 1: splitting wins)"
     );
     println!(
-        "{:12} {:>8} {:>6} {:>9} {:>8} {:>8} {:>8} {:>12} {:>8}",
-        "workload", "samples", "levels", "threshold", "relvar", "EW", "ns", "gain median", "gain EW"
+        "{:12} {:>8} {:>6} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
+        "workload", "samples", "levels", "threshold", "relvar", "p90", "EW", "ns", "gain", "of p90", "of EW"
     );
     for workload in WORKLOADS.iter().filter(|workload| args.wants(workload)) {
         let scene = scenes::scene(workload);
         let points = truths(&scene, 5 * args.effort.study_points);
         let method = Fanlight::new(&scene, None);
-        let study = Study { scene: &scene, method, points, samples: args.effort.samples.div_ceil(2) };
-        study.compare(workload, args.effort.calls);
+        let study = Study { scene: &scene, method, points, samples: args.effort.samples };
+        study.compare(workload, &args.effort);
     }
 }
 
 impl Study<'_> {
-    fn compare(&self, workload: &str, calls: usize) {
+    fn compare(&self, workload: &str, effort: &Effort) {
+        let ways: Vec<Way> = core::iter::once(None).chain(COUNTS.map(|count| Some(self.splitting(count)))).collect();
+        let times = self.nanoseconds(&ways, effort);
         let one = self.measure(None);
-        let ns = self.nanoseconds(None, calls);
-        let print = |count: f64, Splitting { threshold, levels }, summary: &Summary, nanoseconds: f64| {
-            let gain = |get: fn(&Summary) -> f64| get(&one) * ns / (get(summary) * nanoseconds);
+        for (way, ns) in ways.into_iter().zip(&times) {
+            let all = self.measure(way);
+            let gain = |get: fn(&Summary) -> f64| short(get(&one) * times[0] / (get(&all) * ns));
+            let (count, Splitting { threshold, levels }) = way
+                .map_or((1.0, Splitting { threshold: 0.0, levels: 0 }), |splitting| {
+                    (self.count(&splitting), splitting)
+                });
+            let [median, p90, mean, ns] = [all.median, all.p90, all.energy_weighted, *ns].map(short);
             println!(
-                "{workload:12} {count:>8.2} {levels:>6} {threshold:>9.3} {:>8} {:>8} {:>8} {:>12} {:>8}",
-                short(summary.median),
-                short(summary.energy_weighted),
-                short(nanoseconds),
-                short(gain(|s| s.median)),
-                short(gain(|s| s.energy_weighted)),
+                "{workload:12} {count:>8.2} {levels:>6} {threshold:>9.3} {median:>8} {p90:>8} {mean:>8} {ns:>8} \
+                 {:>8} {:>8} {:>8}",
+                gain(|s| s.median),
+                gain(|s| s.p90),
+                gain(|s| s.energy_weighted),
             );
-        };
-        print(1.0, Splitting { threshold: 0.0, levels: 0 }, &one, ns);
-        for wanted in COUNTS {
-            let splitting = self.splitting(wanted);
-            let way = Some(splitting);
-            print(self.count(&splitting), splitting, &self.measure(way), self.nanoseconds(way, calls));
         }
     }
 
@@ -125,22 +126,23 @@ impl Study<'_> {
         summary(parallel(&self.points, at_point).into_iter()).expect("there are points")
     }
 
-    /// Time of a set.
-    fn nanoseconds(&self, way: Way, calls: usize) -> f64 {
-        let points = self.scene.points.timing(calls);
+    /// Times of sets, taken by turns.
+    fn nanoseconds(&self, ways: &[Way], effort: &Effort) -> Vec<f64> {
+        let points = self.scene.points.timing(effort.calls);
         let mut pcg = Pcg32::new(3, 3);
         let inputs: Vec<[f32; 3]> = points.iter().map(|_| pcg.uniform3()).collect();
         let mut samples = Samples::new();
-        let mut time = || {
-            let start = Instant::now();
-            for (x, u) in points.iter().zip(&inputs) {
-                self.draw(x, *u, way, &mut samples);
-                black_box(&samples);
+        let mut times = vec![vec![]; ways.len()];
+        for _ in 0..effort.repeats {
+            for (way, times) in ways.iter().zip(&mut times) {
+                let start = Instant::now();
+                for (x, u) in points.iter().zip(&inputs) {
+                    self.draw(x, *u, *way, &mut samples);
+                    black_box(&samples);
+                }
+                times.push(start.elapsed().as_secs_f64() * 1e9 / effort.calls as f64);
             }
-            start.elapsed().as_secs_f64() * 1e9 / calls as f64
-        };
-        let mut times = [0.0; 5].map(|_: f64| time());
-        times.sort_by(f64::total_cmp);
-        times[2]
+        }
+        times.into_iter().map(median).collect()
     }
 }

@@ -66,10 +66,11 @@ fn averages_are_those_of_many_look_ups() {
         let scale = [0.3, 0.6, 1.7][round % 7 % 3];
         let uv = random_uv(&mut rng, scale);
         let texture = Texture::new(w, h, &image).unwrap().wrap(u, v);
-        // Beyond, blocks stand in for texels.
-        let exact = texels(&Chart::new(&texture, uv).footprint(Cell::root())) <= EXACT_TEXELS;
-        compare(texture, uv, if exact { 2e-3 } else { 1e-1 });
-        compare(texture.filter(Filter::Nearest), uv, if exact { 2e-2 } else { 1e-1 });
+        // Beyond, look-ups in blocks stand in for texels; of images as small as these, they are few.
+        if texels(&Chart::new(&texture, uv).footprint(Cell::root())) <= EXACT_TEXELS {
+            compare(texture, uv, 2e-3);
+            compare(texture.filter(Filter::Nearest), uv, 2e-2);
+        }
         // A line and a point.
         compare(texture, [uv[0], uv[1], uv[0].midpoint(uv[1])], 5e-2);
         compare(texture, [uv[0]; 3], 1e-6);

@@ -17,9 +17,22 @@ struct Halved {
 
 impl Shape for Halved {
     fn worth(&self, cell: &Cell) -> Worth {
-        let weight = if cell.vertices.iter().all(|v| v.x < 0.1) { 0.0 } else { 1.0 / cell.center().length_squared() };
-        Worth { weight, uniform: cell.domain.size <= self.smallest }
+        let weight = if cell.vertices.iter().all(|v| v.x < 0.1) {
+            0.0
+        } else {
+            1.0 / cell.vertices.iter().copied().sum::<Vec3>().length_squared()
+        };
+        Worth { weight, uniform: cell.domain.size <= self.smallest, even: true }
     }
+
+    fn worths<const M: usize>(&self, cell: &Cell, _texture: &Parts<'_, M>, _even: bool) -> Worths<M> {
+        one_by_one(self, cell)
+    }
+}
+
+fn one_by_one<const M: usize>(shape: &impl Shape, cell: &Cell) -> Worths<M> {
+    let worths: [Worth; M] = core::array::from_fn(|i| shape.worth(&cell.child::<M>(i)));
+    Worths { weights: worths.map(|w| w.weight), uniform: worths.map(|w| w.uniform), even: worths.map(|w| w.even) }
 }
 
 /// Follows given indices, then stops choosing: it notes the weights of the first choice that was not given.
@@ -44,7 +57,7 @@ impl Guide for Scripted<'_> {
 }
 
 /// Probability of all leaves, and of all dead ends.
-fn masses<const M: usize>(nodes: &[Node<M>], root: Root, shape: &Halved) -> (f64, f64) {
+fn masses<const M: usize>(nodes: &[Block<M>], root: Root, shape: &Halved) -> (f64, f64) {
     let vertices = [Vec3::new(-1.0, 0.0, 1.0), Vec3::new(1.0, 0.5, 1.5), Vec3::new(0.5, 1.0, 0.75)];
     let (mut leaves, mut dead) = (0.0, 0.0);
     let mut open = Vec::from([(Vec::new(), 1.0)]);
@@ -70,12 +83,12 @@ fn masses<const M: usize>(nodes: &[Node<M>], root: Root, shape: &Halved) -> (f64
     (leaves, dead)
 }
 
-fn tree<const M: usize>(pcg: &mut Pcg32) -> (Vec<Node<M>>, Root) {
+fn tree<const M: usize>(pcg: &mut Pcg32) -> (Vec<Block<M>>, Root) {
     let texels: Vec<f32> = (0..16 * 16).map(|_| if pcg.next_f32() < 0.2 { pcg.next_f32() } else { 0.0 }).collect();
     let texture = Texture::new(16, 16, &texels).expect("texels are finite").filter(Filter::Nearest);
     let mut nodes = Vec::new();
     let uvs = [Vec2::new(0.1, 0.0), Vec2::new(0.9, 0.2), Vec2::new(0.3, 1.0)];
-    let root = build(&Prepared::new(texture), uvs, &mut nodes).expect("uvs are finite");
+    let root = build(&mut Prepared::new(texture), uvs, &mut nodes).expect("uvs are finite");
     (nodes, root)
 }
 
@@ -126,7 +139,11 @@ fn stratified_input_stays_stratified() {
     struct Uniform;
     impl Shape for Uniform {
         fn worth(&self, cell: &Cell) -> Worth {
-            Worth { weight: 1.0, uniform: cell.domain.size <= barycentric::LATTICE >> 6 }
+            Worth { weight: 1.0, uniform: cell.domain.size <= barycentric::LATTICE >> 6, even: true }
+        }
+
+        fn worths<const M: usize>(&self, cell: &Cell, _texture: &Parts<'_, M>, _even: bool) -> Worths<M> {
+            one_by_one(self, cell)
         }
     }
     let vertices = [Vec3::X, Vec3::Y, Vec3::Z];

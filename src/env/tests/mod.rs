@@ -3,6 +3,7 @@
 mod building;
 mod bytes;
 mod sampling;
+mod suns;
 
 use super::Environment;
 use crate::record::Filter;

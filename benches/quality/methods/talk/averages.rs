@@ -4,7 +4,10 @@ use super::cell::Cell;
 use crate::scenes::Scene;
 
 /// Places along a cell's edge that its average is taken of, less one.
-const STEPS: usize = 3;
+const STEPS: u8 = 3;
+
+/// Share of its neighbourhood's maximum that a cell keeps in which nothing was found.
+const LEAST: f64 = 1e-3;
 
 /// Level by level; the root first.
 pub(super) struct Averages(Vec<Vec<f32>>);
@@ -51,13 +54,19 @@ fn add_leaves(scene: &Scene, light: usize, cell: &Cell, depth: u32, leaves: &mut
     if cell.depth < depth {
         return cell.children().iter().for_each(|child| add_leaves(scene, light, child, depth, leaves));
     }
+    let steps = i32::from(STEPS);
+    let at = |i: i32, j: i32| scene.weight(light, cell.place([i, j].map(|k| f64::from(k) / f64::from(steps))));
     let (mut sum, mut count) = (0.0, 0.0);
-    for i in 0..=STEPS {
-        for j in 0..=STEPS - i {
-            let place = [i, j].map(|k| k as f64 / STEPS as f64);
-            sum += scene.weight(light, cell.place(place));
+    for i in 0..=steps {
+        for j in 0..=steps - i {
+            sum += at(i, j);
             count += 1.0;
         }
+    }
+    if sum == 0.0 {
+        // What lies between the places must not be lost.
+        let around = (-1..=steps + 2).flat_map(|i| (-1..=steps + 1 - i).map(move |j| (i, j)));
+        sum = around.map(|(i, j)| at(i, j)).fold(0.0, f64::max) * LEAST;
     }
     leaves.push((sum / count) as f32);
 }

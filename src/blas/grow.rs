@@ -1,0 +1,186 @@
+//! Divides a triangle's cells from the top, one level at a time.
+
+use alloc::vec::Vec;
+
+use crate::blas::barycentric::Cell;
+use crate::blas::coverage::{average, storable};
+use crate::blas::footprint::Chart;
+use crate::blas::pyramid::Prepared;
+use crate::blas::touched::{self, Range};
+use crate::record::Filter;
+
+/// Fine cells are divided until what their contrast adds to the relative variance is below this.
+const VARIANCE: f64 = 0.003;
+
+/// The variance of a ramp, as a share of what two values at its ends would have.
+const RAMP: f64 = 1.0 / 3.0;
+
+/// From this number of cells on, they are looked at in parallel.
+#[cfg(feature = "rayon")]
+const PARALLEL: usize = 256;
+
+/// How far a tree may grow.
+pub(crate) struct Limits {
+    /// Most nodes; one at least.
+    pub(crate) nodes: usize,
+    /// From this level on, cells are fine: there must be a reason to divide them.
+    pub(crate) fine: u32,
+    /// Cells of this level are not divided.
+    pub(crate) deepest: u32,
+}
+
+/// A tree before it is packed.
+pub(crate) struct Tree {
+    /// That of the whole triangle.
+    pub(crate) average: f32,
+    /// Those of all cells, node by node, breadth first.
+    pub(crate) averages: Vec<f32>,
+    /// Which cells have a node below, in the same order. The first such cell has the second node, and so on.
+    pub(crate) divided: Vec<bool>,
+}
+
+/// A cell of which it is not yet known whether it is divided.
+struct Open {
+    cell: Cell,
+    range: Range,
+    /// Its place in the tree.
+    at: usize,
+}
+
+/// A cell that could be a leaf.
+struct Measured {
+    average: f32,
+    /// Estimate of what its contrast adds to the variance, for a cell of unit area.
+    variance: f64,
+}
+
+/// Grows the tree of a triangle in which look-ups are not all the same. It has no nodes if that is not worth one.
+pub(crate) fn grow<const M: usize>(prepared: &Prepared<'_>, chart: &Chart, range: Range, limits: &Limits) -> Tree {
+    // The whole triangle stands in front, as the only cell of a node before the first.
+    let mut growing = Growing { prepared, chart, averages: alloc::vec![0.0], divided: alloc::vec![false], mass: 0.0 };
+    let mut open = alloc::vec![Open { cell: Cell::root(), range, at: 0 }];
+    let (mut nodes, mut level, mut share) = (0, 0, 1.0);
+    while !open.is_empty() {
+        let room = if level == limits.deepest { 0 } else { limits.nodes - nodes };
+        open = growing.choose(open, room, level >= limits.fine, share);
+        nodes += open.len();
+        level += 1;
+        share /= M as f64;
+        open = growing.divide::<M>(open, level >= limits.fine, share);
+    }
+    growing.finish::<M>()
+}
+
+struct Growing<'a> {
+    prepared: &'a Prepared<'a>,
+    chart: &'a Chart,
+    averages: Vec<f32>,
+    divided: Vec<bool>,
+    /// The integral over all leaves so far, for a triangle of unit area.
+    mass: f64,
+}
+
+impl Growing<'_> {
+    fn range(&self, cell: Cell, exact: bool) -> Range {
+        touched::range(self.prepared, &self.chart.footprint(cell), exact)
+    }
+
+    fn average(&self, cell: Cell, range: Range) -> f32 {
+        average(self.prepared, &self.chart.footprint(cell), range)
+    }
+
+    /// The relative variance of sampling by averages is the sum of variance over mean. Ends of the range bound the
+    /// variance (Bhatia and Davis 2000); with two values, and that is what edges have, the bound is exact.
+    fn measure(&self, open: &Open, is_exact: bool) -> Measured {
+        let range = if is_exact { open.range } else { self.range(open.cell, true) };
+        let average = self.average(open.cell, range);
+        let [min, max, mean] = [range.min, range.max, average].map(f64::from);
+        let spread = match self.prepared.texture().filtering() {
+            Filter::Nearest => 1.0,
+            Filter::Bilinear => RAMP,
+        };
+        Measured { average, variance: spread * (max - mean) * (mean - min) / mean }
+    }
+
+    /// The cells that are to be divided, in their order; the others become leaves.
+    fn choose(&mut self, open: Vec<Open>, room: usize, fine: bool, share: f64) -> Vec<Open> {
+        if !fine && open.len() <= room {
+            return open;
+        }
+        let measured = map(&open, |open| self.measure(open, fine));
+        let mass = self.mass + share * measured.iter().map(|m| f64::from(m.average)).sum::<f64>();
+        let mut ranks: Vec<(f64, usize)> = measured.iter().map(|m| m.variance).zip(0..).collect();
+        ranks.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        // Without contrast enough, they stay undivided from the end.
+        let mut left = 0.0;
+        let enough = |(variance, _): &&(f64, usize)| {
+            left += share * variance;
+            fine && left <= VARIANCE * mass
+        };
+        let spared = ranks.iter().rev().take_while(enough).count();
+        let mut is_kept = alloc::vec![false; open.len()];
+        for &(_, i) in ranks[..ranks.len() - spared].iter().take(room) {
+            is_kept[i] = true;
+        }
+        for ((open, measured), _) in open.iter().zip(&measured).zip(&is_kept).filter(|(_, is_kept)| !**is_kept) {
+            self.set(open.at, measured.average, share);
+        }
+        open.into_iter().zip(is_kept).filter_map(|(open, is_kept)| is_kept.then_some(open)).collect()
+    }
+
+    /// Adds the nodes below cells. Returns those of their cells over which look-ups differ.
+    fn divide<const M: usize>(&mut self, open: Vec<Open>, exact: bool, share: f64) -> Vec<Open> {
+        let children: Vec<[(Cell, Range); M]> = map(&open, |open| {
+            core::array::from_fn(|slot| {
+                let cell = open.cell.child::<M>(slot);
+                (cell, self.range(cell, exact))
+            })
+        });
+        let mut next = Vec::new();
+        for (parent, children) in open.iter().zip(children) {
+            self.divided[parent.at] = true;
+            for (cell, range) in children {
+                let at = self.averages.len();
+                self.averages.push(0.0);
+                self.divided.push(false);
+                if range.is_constant() {
+                    self.set(at, storable(f64::from(range.max)), share);
+                } else {
+                    next.push(Open { cell, range, at });
+                }
+            }
+        }
+        next
+    }
+
+    fn set(&mut self, at: usize, average: f32, share: f64) {
+        self.averages[at] = average;
+        self.mass += share * f64::from(average);
+    }
+
+    /// Sets the average of every divided cell to the mean of its node.
+    fn finish<const M: usize>(mut self) -> Tree {
+        let mut end = self.averages.len();
+        for at in (0..self.averages.len()).rev() {
+            if self.divided[at] {
+                let node = &self.averages[end - M..end];
+                let mean = node.iter().map(|average| f64::from(*average)).sum::<f64>() / M as f64;
+                self.averages[at] = storable(mean);
+                end -= M;
+            }
+        }
+        let average = self.averages[0];
+        Tree { average, averages: self.averages.split_off(1), divided: self.divided.split_off(1) }
+    }
+}
+
+/// Maps all items, in parallel with the feature `rayon`. Each one is mapped alone, and the order stays: the result does
+/// not depend on the number of threads.
+fn map<T: Sync, R: Send>(items: &[T], map: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "rayon")]
+    if items.len() >= PARALLEL {
+        use rayon::prelude::*;
+        return items.par_iter().map(map).collect();
+    }
+    items.iter().map(map).collect()
+}

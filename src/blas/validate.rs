@@ -1,0 +1,138 @@
+//! Checks trees that came from outside.
+
+use alloc::vec;
+
+use crate::blas::barycentric::{MAX_DEPTH, level_halvings};
+use crate::blas::coverage::MAX_AVERAGE;
+use crate::blas::node::{Block, CELLS, LEAF, Root, averages, below};
+use crate::error::Error;
+
+/// Number of nodes that a pool has place for.
+fn node_count<const M: usize>(blocks: &[Block<M>]) -> usize {
+    blocks.len() * CELLS / M
+}
+
+fn is_lit<const M: usize>(blocks: &[Block<M>], node: u32) -> bool {
+    averages(blocks, node).iter().any(|average| *average > 0.0)
+}
+
+/// Checks a pool: afterwards every descent from any node ends, stays in bounds, and finds a positive cell below every
+/// positive cell.
+pub(crate) fn validate<const M: usize>(blocks: &[Block<M>]) -> Result<(), Error> {
+    let count = node_count(blocks);
+    Error::unless_equal("number of cells", blocks.len() * CELLS, count * M)?;
+    if count >= LEAF as usize {
+        return Err(Error::bytes("number of nodes", 0, count, LEAF - 1));
+    }
+    let max_levels = MAX_DEPTH / level_halvings::<M>();
+    // A node's level: how many nodes are above it on the longest way. Ways lead up in the pool only.
+    let mut levels = vec![1u8; count];
+    for node in 0..count as u32 {
+        let averages = averages(blocks, node);
+        for (cell, average) in averages.into_iter().enumerate() {
+            let child = below(blocks, node, cell);
+            if child == LEAF {
+                // The number is not in use, or its bit is not set; either way a descent ends.
+                if is_divided(blocks, node, cell) {
+                    return Err(Error::bytes("number of a node", node as usize, child, count));
+                }
+                continue;
+            }
+            if child <= node || child as usize >= count {
+                return Err(Error::bytes("number of a node", node as usize, child, count));
+            }
+            let level = levels[node as usize] + 1;
+            if u32::from(level) > max_levels {
+                return Err(Error::bytes("depth of a node", node as usize, level, max_levels));
+            }
+            if is_lit(blocks, child) != (average > 0.0) {
+                return Err(Error::bytes("weight of a cell", node as usize, average.to_bits(), child));
+            }
+            let deepest = &mut levels[child as usize];
+            *deepest = level.max(*deepest);
+        }
+    }
+    Ok(())
+}
+
+fn is_divided<const M: usize>(blocks: &[Block<M>], node: u32, cell: usize) -> bool {
+    let at = node as usize * M + cell;
+    blocks[at / CELLS].divided() >> (at % CELLS) & 1 == 1
+}
+
+/// Checks the roots into a pool that [`validate`] has passed.
+pub(crate) fn validate_roots<const M: usize>(roots: &[Root], blocks: &[Block<M>]) -> Result<(), Error> {
+    let count = node_count(blocks);
+    for (i, root) in roots.iter().enumerate() {
+        // NaN fails.
+        if !(0.0..=MAX_AVERAGE).contains(&root.average) {
+            return Err(Error::bytes("weight of a triangle", i, root.average.to_bits(), MAX_AVERAGE.to_bits()));
+        }
+        if root.node == LEAF {
+            continue;
+        }
+        if root.node as usize >= count {
+            return Err(Error::bytes("number of a node", i, root.node, count));
+        }
+        if is_lit(blocks, root.node) != (root.average > 0.0) {
+            return Err(Error::bytes("weight of a triangle", i, root.average.to_bits(), root.node));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::blas::node::append;
+    use alloc::vec::Vec;
+
+    /// Each node but the last has one below its cell 2.
+    fn chain(n: usize) -> Vec<Block<4>> {
+        let averages: Vec<f32> = (0..4 * n).map(|i| if i % 4 == 2 { 1.0 } else { 0.0 }).collect();
+        let divided: Vec<bool> = (0..4 * n).map(|i| i % 4 == 2 && i + 4 < 4 * n).collect();
+        let mut blocks = Vec::new();
+        append(&mut blocks, &averages, &divided);
+        blocks
+    }
+
+    /// The same with one byte changed.
+    fn changed(n: usize, at: usize, value: u8) -> Vec<Block<4>> {
+        let mut blocks = chain(n);
+        bytemuck::cast_slice_mut(&mut blocks)[at] = value;
+        blocks
+    }
+
+    #[test]
+    fn bytes_from_outside() {
+        assert!(validate::<4>(&[]).is_ok());
+        assert!(validate(&chain(20)).is_ok());
+        assert!(validate(&chain(21)).is_err());
+        assert!(validate(&changed(3, 8 + 2, 9)).is_ok());
+        // A node below a black cell, a black cell above a lit node, a node above itself, and one beyond the pool.
+        assert!(validate(&changed(3, 0, 0b0100_0101)).is_err());
+        assert!(validate(&changed(3, 8 + 6, 0)).is_err());
+        assert!(validate(&changed(3, 4, 0)).is_err());
+        assert!(validate(&changed(3, 4, 8)).is_err());
+        assert!(validate(&changed(3, 7, 0xff)).is_err());
+        for number in [[0xff; 4], [0xfe, 0xff, 0xff, 0xff]] {
+            let mut blocks = chain(3);
+            bytemuck::cast_slice_mut::<_, u8>(&mut blocks)[4..8].copy_from_slice(&number);
+            assert!(validate(&blocks).is_err(), "{number:?}");
+        }
+        // Half a node of arity 64.
+        assert!(validate::<64>(&[bytemuck::Zeroable::zeroed()]).is_err());
+    }
+
+    #[test]
+    fn roots_from_outside() {
+        let blocks = chain(2);
+        for bad in [f32::NAN, f32::INFINITY, -1.0, 1e31] {
+            assert!(validate_roots::<4>(&[Root::constant(bad)], &blocks).is_err());
+        }
+        assert!(validate_roots(&[Root { average: 0.25, node: 1 }, Root::constant(0.0)], &blocks).is_ok());
+        assert!(validate_roots(&[Root { average: 0.25, node: 8 }], &blocks).is_err());
+        assert!(validate_roots(&[Root { average: 0.25, node: 2 }], &blocks).is_err());
+        assert!(validate_roots(&[Root { average: 0.0, node: 0 }], &blocks).is_err());
+    }
+}

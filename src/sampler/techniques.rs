@@ -1,0 +1,146 @@
+//! How often suns and trees are used at one shading point.
+
+use crate::env::MAX_SUNS;
+use crate::light::Part;
+use crate::warp::{Variate, pick, pick_pair, sum};
+
+/// Most pairs of a sun and a part of a portal that shows some of it. Of a sun with more, directions are drawn as if
+/// there were no walls.
+pub(super) const MAX_SEEN: usize = 64;
+const _: () = assert!(MAX_SEEN > MAX_SUNS);
+
+/// Stands for all portals.
+pub(super) const ANY: u32 = u32::MAX;
+
+/// Least probability of the trees where they may find anything.
+const LEAST_TREES: f32 = 0.02;
+
+/// Largest estimate of an irradiance, so that sums stay finite.
+const BRIGHTEST: f32 = 1e35;
+
+/// A sun through a part of a portal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// Or [`ANY`].
+    pub(super) leaf: u32,
+    pub(super) sun: u32,
+    pub(super) part: Part,
+}
+
+/// How often each technique is used at one shading point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Techniques {
+    seen: [Seen; MAX_SEEN],
+    /// Irradiance from each.
+    weights: [f32; MAX_SEEN],
+    count: usize,
+    /// Irradiance from the trees.
+    rest: f32,
+    /// Probability of the trees; 1 if they are used anyway.
+    pub(super) trees: f64,
+    /// Probability of a pair per weight; 0 if there is none.
+    pub(super) per_weight: f64,
+}
+
+/// A technique that was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Technique {
+    Trees,
+    /// By its place in the list.
+    Sun(usize),
+}
+
+impl Techniques {
+    /// The trees alone.
+    pub(super) const TREES: Self = Self {
+        seen: [Seen { leaf: 0, sun: 0, part: Part::WHOLE }; MAX_SEEN],
+        weights: [0.0; MAX_SEEN],
+        count: 0,
+        rest: 1.0,
+        trees: 1.0,
+        per_weight: 0.0,
+    };
+
+    /// Whether no sun is seen.
+    #[inline]
+    pub(super) fn is_trees(&self) -> bool {
+        self.per_weight == 0.0
+    }
+
+    fn weights(&self) -> &[f32] {
+        &self.weights[..self.count]
+    }
+
+    /// Chooses one technique.
+    #[inline]
+    pub(super) fn choose(&self, u: &mut Variate) -> Technique {
+        if self.is_trees() {
+            return Technique::Trees;
+        }
+        let suns = sum(self.weights());
+        match pick_pair([suns as f32, self.rest], u) {
+            0 => Technique::Sun(pick(self.weights(), suns, u)),
+            _ => Technique::Trees,
+        }
+    }
+
+    /// The trees in any case, and one of the suns next to them.
+    pub(super) fn side_by_side(self) -> Self {
+        if self.is_trees() {
+            return self;
+        }
+        Self { trees: 1.0, per_weight: 1.0 / sum(self.weights()), ..self }
+    }
+
+    /// Chooses among the suns alone, if any is seen.
+    pub(super) fn choose_sun(&self, u: &mut Variate) -> Option<usize> {
+        (!self.is_trees()).then(|| pick(self.weights(), sum(self.weights()), u))
+    }
+
+    /// Number of pairs so far.
+    pub(super) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Appends a pair. There must be room for it.
+    pub(super) fn push(&mut self, leaf: u32, sun: usize, part: Part, weight: f32) {
+        self.seen[self.count] = Seen { leaf, sun: sun as u32, part };
+        self.weights[self.count] = weight;
+        self.count += 1;
+    }
+
+    /// Replaces all pairs from one on by the sun as such.
+    pub(super) fn merge(&mut self, start: usize, sun: usize, weight: f32) {
+        self.count = start;
+        self.push(ANY, sun, Part::WHOLE, weight);
+    }
+
+    /// Irradiance from all pairs from one on.
+    pub(super) fn irradiance(&self, start: usize) -> f32 {
+        sum(&self.weights()[start..]) as f32
+    }
+
+    /// A pair by its place in the list.
+    pub(super) fn seen(&self, index: usize) -> Seen {
+        self.seen[index]
+    }
+
+    /// The pairs of one sun, with their weights.
+    pub(super) fn of_sun(&self, sun: usize) -> impl Iterator<Item = (Seen, f32)> {
+        let pairs = self.seen.iter().copied().zip(self.weights().iter().copied());
+        pairs.filter(move |(seen, _)| seen.sun as usize == sun)
+    }
+
+    /// Balances the pairs with the trees, which are estimated to send so much.
+    pub(super) fn balance(mut self, trees: impl FnOnce() -> f32) -> Self {
+        let suns = self.irradiance(0);
+        if !(suns > 0.0 && suns < BRIGHTEST) {
+            return Self::TREES;
+        }
+        let trees = trees();
+        self.rest = if trees > 0.0 { trees.max(LEAST_TREES * suns).min(BRIGHTEST) } else { 0.0 };
+        let total = f64::from(suns) + f64::from(self.rest);
+        (self.trees, self.per_weight) = (f64::from(self.rest) / total, 1.0 / total);
+        self
+    }
+}
