@@ -27,7 +27,7 @@ Options:
 
 For a FILE:
   --portal-prefix PREFIX  meshes whose material's name starts with it are portals [window]
-  --env FILE              latitude-longitude environment, .hdr or .exr [an analytic clear sky with a sun]
+  --env FILE              latitude-longitude environment, .hdr or .exr, or `none` [a clear sky with a sun]
   --bounces N             surfaces that light may touch on its way [5]
 ";
 

@@ -76,8 +76,9 @@ fn render_scene(scene: &Scene, folder: &Path, arguments: &Arguments) -> Result<[
 
 fn render_file(path: &Path, arguments: &Arguments) -> Result<(), Error> {
     let sky = match &arguments.environment {
-        Some(path) => Sky::new(read_rgb(path)?),
-        None => Daylight::new().draw(),
+        Some(path) if path.as_os_str() == "none" => None,
+        Some(path) => Some(Sky::new(read_rgb(path)?)),
+        None => Some(Daylight::new().draw()),
     };
     let mut model = gltf::read(path, &arguments.portal_prefix, sky)?;
     resize(&mut model, arguments);

@@ -16,11 +16,11 @@ const SMALLEST: f32 = 1e-3;
 const MOST: usize = 50_000_000;
 
 /// Reads a scene. Its environment is not in the file.
-pub(crate) fn read(path: &Path, portal_prefix: &str, sky: Sky) -> Result<Model, Error> {
+pub(crate) fn read(path: &Path, portal_prefix: &str, sky: Option<Sky>) -> Result<Model, Error> {
     read_model(path, portal_prefix, sky).map_err(|error| format!("cannot read {}: {error}", path.display()).into())
 }
 
-fn read_model(path: &Path, portal_prefix: &str, sky: Sky) -> Result<Model, Error> {
+fn read_model(path: &Path, portal_prefix: &str, sky: Option<Sky>) -> Result<Model, Error> {
     let bytes = std::fs::read(path)?;
     let file = gltf::Gltf::from_slice(&bytes).map_err(|error| format!("this is not a glTF 2.0 file ({error})"))?;
     let folder = path.parent();
@@ -40,7 +40,7 @@ fn read_model(path: &Path, portal_prefix: &str, sky: Sky) -> Result<Model, Error
 
     let scene = file.document.default_scene().or_else(|| file.document.scenes().next()).ok_or("it holds no scene")?;
     let camera = Camera::looking(Vec3::ONE, Vec3::ZERO, 60.0);
-    let mut reader = Reader { model: Model::new(camera, Some(sky)), buffers, has_camera: false };
+    let mut reader = Reader { model: Model::new(camera, sky), buffers, has_camera: false };
     portal_prefix.clone_into(&mut reader.model.portal_prefix);
     for material in file.document.materials() {
         let read = surface::material(&material, &images, &mut reader.model.bitmaps)?;
@@ -139,7 +139,7 @@ impl Reader {
         let count = |wanted: &dyn Fn(&Mesh) -> bool| self.model.meshes.iter().filter(|mesh| wanted(mesh)).count();
         let portals = count(&|mesh| self.model.is_portal(mesh));
         let emitters = count(&|mesh| self.model.materials[mesh.material].emits());
-        println!("{triangles} triangles, {portals} portals, {emitters} emitting meshes");
+        println!("triangles: {triangles}, portal meshes: {portals}, emitting meshes: {emitters}");
         if portals + emitters == 0 {
             eprintln!(
                 "note: no material emits light, and none has a name that starts with `{}`: there is nothing to gain",

@@ -5,6 +5,8 @@
 //! integrator that asks for directions and for densities of directions ([`path`], and [`photon`] for light that is
 //! traced from its source).
 
+extern crate alloc;
+
 mod bitmap;
 mod bsdf;
 mod camera;

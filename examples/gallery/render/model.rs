@@ -1,6 +1,6 @@
 //! A scene as it is described: by a file, or by one of the built-in generators.
 
-use std::sync::Arc;
+use super::alloc::sync::Arc;
 
 use glam::Vec3;
 

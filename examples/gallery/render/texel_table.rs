@@ -3,6 +3,8 @@
 //! Triangles are cut along texels, and all parts stand in one cumulative table (Šik and Křivánek, "Fast Random Sampling
 //! of Triangular Meshes", 2013).
 
+use super::alloc::sync::Arc;
+
 use glam::{Vec2, Vec3, vec2};
 use smallvec::{SmallVec, smallvec};
 
@@ -32,7 +34,7 @@ pub(crate) struct TexelTable {
 struct Densities {
     width: usize,
     /// The same for all triangles with the same image.
-    per_area: std::sync::Arc<[f32]>,
+    per_area: Arc<[f32]>,
 }
 
 impl TexelTable {
@@ -63,7 +65,7 @@ impl TexelTable {
                 |bitmap| bitmap.texels().map(|texel| LUMINANCE.dot(material.emission * texel.truncate())).collect(),
             );
             let mean = texels.iter().sum::<f32>() / texels.len() as f32;
-            let (width, per_area): (_, std::sync::Arc<[f32]>) = match bitmap {
+            let (width, per_area): (_, Arc<[f32]>) = match bitmap {
                 Some(bitmap) if by_texel => (bitmap.width, texels.into()),
                 _ => (1, [mean].into()),
             };

@@ -1,6 +1,6 @@
 //! Everything that light meets on its way: surfaces, fog and the sky.
 
-use std::sync::Arc;
+use super::alloc::sync::Arc;
 
 use glam::Vec3;
 

@@ -5,7 +5,7 @@ use core::f32::consts::TAU;
 
 use glam::{Vec3, vec3};
 
-use super::shapes::{overcast, painted_sky};
+use super::shapes::hazy;
 use crate::render::{Camera, Lobe, Material, Mesh, Model};
 
 /// A point between all windows.
@@ -15,8 +15,8 @@ const GLASS: f32 = 0.006;
 
 pub(crate) fn car() -> Model {
     let camera = Camera::looking(vec3(0.12, 0.98, 0.95), vec3(-0.05, 0.72, -0.6), 70.0);
-    let mut model = Model::new(camera, Some(painted_sky(bright_above)));
-    model.guide_texels = Some(64);
+    let mut model = Model::new(camera, Some(hazy(Vec3::Y, 40.0, 15.0)));
+    model.guide_texels = Some(32);
     let panes = panes();
 
     // Its two faces let through what one pane does.
@@ -33,13 +33,6 @@ pub(crate) fn car() -> Model {
     add_body(&mut model);
     add_interior(&mut model);
     model
-}
-
-/// Overcast, but bright around the zenith, where the sun stands behind thin clouds.
-fn bright_above(direction: Vec3) -> Vec3 {
-    let from_zenith = direction.y.clamp(-1.0, 1.0).acos().to_degrees();
-    let glow = 30.0 * (-(from_zenith / 14.0) * (from_zenith / 14.0)).exp();
-    overcast(direction) + vec3(1.0, 0.95, 0.85) * glow
 }
 
 /// A flat piece between four corners.

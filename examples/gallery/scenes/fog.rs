@@ -1,16 +1,17 @@
-//! Fog in a room with a window: beams of sunlight between its bars.
+//! Fog in a room with a window: hazy sunlight between its bars.
 
 use glam::{Vec2, Vec3, vec2, vec3};
 
-use super::shapes::{card, rectangle, wall_at, walls};
-use crate::render::{Bitmap, Camera, Daylight, Fog, Material, Model};
+use super::shapes::{card, hazy, rectangle, wall_at, walls};
+use crate::render::{Bitmap, Camera, Fog, Material, Model};
 
 const SIZE: Vec3 = vec3(5.0, 3.2, 4.0);
 
 pub(crate) fn fog() -> Model {
     let camera = Camera::looking(vec3(3.9, 1.3, 3.8), vec3(0.6, 1.35, 1.3), 58.0);
-    let mut model = Model::new(camera, Some(Daylight::new().draw()));
+    let mut model = Model::new(camera, Some(hazy(vec3(-0.8, 0.55, 0.3).normalize(), 30.0, 10.0)));
     walls(&mut model, SIZE, [vec3(0.4, 0.35, 0.3), Vec3::splat(0.5), vec3(0.45, 0.45, 0.5)]);
+    model.guide_texels = Some(64);
     let (low, high) = (vec2(1.2, 0.9), vec2(2.8, 2.5));
     let outline = rectangle(Vec2::ZERO, vec2(SIZE.y, SIZE.z));
     let wall = model.material(Material::new("front", Vec3::splat(0.5)));

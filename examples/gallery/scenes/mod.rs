@@ -37,7 +37,7 @@ pub(crate) const ALL: [Scene; 9] = [
     Scene { name: "room", model: room::room, bounces: &[1, 5], detail: [0.72, 0.8] },
     Scene { name: "car", model: car::car, bounces: &[1, 5], detail: [0.5, 0.62] },
     Scene { name: "lantern", model: lantern::lantern, bounces: &[4], detail: [0.3, 0.75] },
-    Scene { name: "letters", model: letters, bounces: &[1], detail: [0.5, 0.5] },
+    Scene { name: "letters", model: letters, bounces: &[1], detail: [0.5, 0.41] },
     Scene { name: "pinhole", model: pinhole::pinhole, bounces: &[1], detail: [0.5, 0.5] },
     Scene { name: "facade", model: || overcast_facade(100), bounces: &[1, 3], detail: [0.4, 0.8] },
     Scene { name: "nested", model: nested, bounces: &[1], detail: [0.6, 0.7] },

@@ -21,7 +21,7 @@ pub(crate) fn nested() -> Model {
         let opening = rectangle(CENTER - half, CENTER + half);
         let outline = rectangle(Vec2::ZERO, vec2(SIZE.y, SIZE.z));
         let wall = model.material(Material::new(name, Vec3::splat(0.6)));
-        model.add(wall.polygon(wall_at(x), &outline, &[opening.clone()]));
+        model.add(wall.polygon(wall_at(x), &outline, core::slice::from_ref(&opening)));
         let window = model.material(Material::new(&format!("window {name}"), Vec3::ONE).lobe(Lobe::Clear));
         model.add(window.polygon(wall_at(x), &opening, &[]));
     }

@@ -76,3 +76,11 @@ pub(crate) fn overcast(direction: Vec3) -> Vec3 {
     }
     vec3(0.9, 0.97, 1.1) * (1.0 + 2.0 * direction.y) / 3.0
 }
+
+/// The same with a sun behind thin clouds: so bright, and spread over so many degrees.
+pub(crate) fn hazy(sun: Vec3, brightness: f32, degrees: f32) -> Sky {
+    painted_sky(|direction| {
+        let distance = direction.angle_between(sun).to_degrees() / degrees;
+        overcast(direction) + vec3(1.0, 0.95, 0.85) * (brightness * (-distance * distance).exp())
+    })
+}

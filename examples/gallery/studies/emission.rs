@@ -4,7 +4,7 @@
 
 use core::f32::consts::{PI, TAU};
 
-use fanlight::{Emission, Environment, Filter, LightSampler, Mesh, ShadingPoint, Sides, Texture, Weight};
+use fanlight::{Emission, Environment, Filter, LightSampler, Mesh, PointSampler, ShadingPoint, Sides, Texture, Weight};
 use glam::{Vec2, Vec3};
 
 use crate::render::{Error, LUMINANCE, Model, Sky};
@@ -41,8 +41,10 @@ pub(super) struct Emitter<'a> {
 pub(super) enum Way<'a> {
     /// To all of the sphere around the room.
     Unguided,
-    /// Through the portal.
-    Guided(Emission<'a>),
+    /// Through the portal, from the lights behind it.
+    Guided(Box<Emission<'a>>),
+    /// Through the portal, as seen from a point.
+    From(Box<PointSampler<'a>>),
 }
 
 impl<'a> Emitter<'a> {
@@ -75,33 +77,30 @@ impl<'a> Emitter<'a> {
 
     /// The way through the portal.
     pub(super) fn guided(&self) -> Way<'_> {
-        Way::Guided(self.sampler.emission())
+        match self.source {
+            Source::Point(origin) => Way::From(Box::new(self.sampler.at(&ShadingPoint::volume(origin)))),
+            Source::Distant(_) | Source::Sky => Way::Guided(Box::new(self.sampler.emission())),
+        }
     }
 
     /// One photon.
     pub(super) fn photon(&self, way: &Way<'_>, u: [f32; 5]) -> Option<Photon> {
-        match way {
-            Way::Unguided => self.unguided(u),
-            Way::Guided(emission) => self.through_portal(emission, u),
-        }
-    }
-
-    fn through_portal(&self, emission: &Emission<'_>, u: [f32; 5]) -> Option<Photon> {
         let [u0, u1, u2, ..] = u;
-        match self.source {
-            Source::Point(origin) => {
-                let sample = self.sampler.sample(&ShadingPoint::volume(origin), [u0, u1, u2])?;
+        match (way, self.source) {
+            (Way::From(portal), Source::Point(origin)) => {
+                let sample = portal.sample([u0, u1, u2])?;
                 Some(Photon { origin, direction: sample.direction, power: 1.0 / sample.pdf })
             }
-            Source::Distant(towards) => {
+            (Way::Guided(emission), Source::Distant(towards)) => {
                 let ray = emission.sample_distant(-towards, [u0, u1, u2])?;
                 Some(Photon { origin: ray.position, direction: ray.direction, power: 1.0 / ray.pdf })
             }
-            Source::Sky => {
+            (Way::Guided(emission), Source::Sky) => {
                 let ray = emission.sample(u)?;
                 let power = self.radiance(-ray.direction) / ray.pdf;
                 Some(Photon { origin: ray.position, direction: ray.direction, power })
             }
+            _ => self.unguided(u),
         }
     }
 

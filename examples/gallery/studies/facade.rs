@@ -1,6 +1,6 @@
 //! Ten thousand windows: what they cost against a single one, and what remains of the gain with a sun behind them.
 
-use std::hint::black_box;
+use core::hint::black_box;
 use std::time::Instant;
 
 use glam::{Vec3, vec3};

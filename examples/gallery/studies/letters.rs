@@ -1,5 +1,6 @@
 //! Photons that fall on the floor through letters: how many get there, and how evenly.
 
+use std::sync::LazyLock;
 use std::time::Instant;
 
 use glam::{Vec3, vec3};
@@ -14,6 +15,8 @@ use crate::report::{Comparison, Effort};
 const PHOTONS: u32 = 100_000;
 /// And how many times as many make the reference.
 const REFERENCE_FACTOR: u32 = 64;
+/// How many times as many are timed.
+const TIMED_FACTOR: u32 = 16;
 /// Photons that are traced in one piece.
 const PIECE: u32 = 5_000;
 /// The floor, in metres along z and x, and its cells.
@@ -49,17 +52,23 @@ fn study_source(name: &str, emitter: &Emitter<'_>, world: &World, seed: u32) -> 
     let reference = fall(&guided, Numbers::Independent, !seed, REFERENCE_FACTOR * PHOTONS);
     let reference = Reference::exact(reference.image());
 
-    let rows = [("unguided", &unguided), ("guided", &independent), ("guided, stratified", &stratified)];
-    for (way, fall) in rows {
-        let rate = |fall: &Fall| f64::from(fall.through) / fall.seconds;
+    // Long enough to be timed.
+    let rate = |way: &Way<'_>, numbers| fall(way, numbers, seed, TIMED_FACTOR * PHOTONS).rate();
+    let unguided_rate = rate(&Way::Unguided, Numbers::Independent);
+    let rows = [
+        ("unguided", &unguided, unguided_rate),
+        ("guided", &independent, rate(&guided, Numbers::Independent)),
+        ("guided, stratified", &stratified, rate(&guided, Numbers::Stratified)),
+    ];
+    for (way, fall, rate) in rows {
         println!(
             "{:34} {:>8.2}% {:>14.3e} {:>12.4e} {:>12.3e} {:>10.1}",
             format!("{name}, {way}"),
             100.0 * f64::from(fall.through) / f64::from(fall.photons),
-            rate(fall),
+            rate,
             fall.flux(),
             error(&fall.image(), reference.image()),
-            rate(fall) / rate(&unguided),
+            rate / unguided_rate,
         );
     }
     let seen = Image::black(CELLS[0], CELLS[1]);
@@ -98,26 +107,34 @@ impl Numbers {
     }
 }
 
-/// One dimension of Sobol's sequence. Degrees, polynomials and first numbers are those of Joe and Kuo (2008).
+/// One dimension of Sobol's sequence.
 fn sobol(i: u32, dimension: usize) -> u32 {
-    const TABLE: [(usize, u32, [u32; 3]); 4] =
-        [(1, 0, [1, 0, 0]), (2, 1, [1, 3, 0]), (3, 1, [1, 3, 1]), (3, 2, [1, 1, 1])];
-    let Some((degree, polynomial, first)) = dimension.checked_sub(1).map(|row| TABLE[row]) else {
-        return i.reverse_bits();
-    };
-    let mut directions = [0_u32; 32];
-    for k in 0..32 {
-        directions[k] = if k < degree {
-            first[k] << (31 - k)
-        } else {
-            let before = directions[k - degree];
-            (1..degree)
-                .filter(|j| polynomial >> (degree - 1 - j) & 1 == 1)
-                .fold(before ^ before >> degree, |bits, j| bits ^ directions[k - j])
-        };
-    }
+    let directions = &SOBOL[dimension];
     (0..32).filter(|k| i >> k & 1 == 1).fold(0, |bits, k| bits ^ directions[k])
 }
+
+/// Its direction numbers. Degrees, polynomials and first numbers are those of Joe and Kuo (2008).
+static SOBOL: LazyLock<[[u32; 32]; 5]> = LazyLock::new(|| {
+    const TABLE: [(usize, u32, [u32; 3]); 4] =
+        [(1, 0, [1, 0, 0]), (2, 1, [1, 3, 0]), (3, 1, [1, 3, 1]), (3, 2, [1, 1, 1])];
+    core::array::from_fn(|dimension| {
+        let mut directions = core::array::from_fn(|k| 1 << (31 - k));
+        let Some((degree, polynomial, first)) = dimension.checked_sub(1).map(|row| TABLE[row]) else {
+            return directions;
+        };
+        for k in 0..32 {
+            directions[k] = if k < degree {
+                first[k] << (31 - k)
+            } else {
+                let before: u32 = directions[k - degree];
+                (1..degree)
+                    .filter(|j| polynomial >> (degree - 1 - j) & 1 == 1)
+                    .fold(before ^ before >> degree, |bits, j| bits ^ directions[k - j])
+            };
+        }
+        directions
+    })
+});
 
 /// Photons that fell on the floor.
 struct Fall {
@@ -152,6 +169,11 @@ impl Fall {
                 (a + b, sum)
             });
         Self { photons, through, seconds: start.elapsed().as_secs_f64(), power }
+    }
+
+    /// Photons through the letters per second.
+    fn rate(&self) -> f64 {
+        f64::from(self.through) / self.seconds
     }
 
     /// Power on the floor.
