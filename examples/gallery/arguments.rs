@@ -1,0 +1,111 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use lexopt::prelude::*;
+
+use crate::render::{Budget, Error};
+
+/// What `--help` prints.
+pub(crate) const HELP: &str = "\
+Renders scenes without and with fanlight in the same time, and prints their errors against a long reference.
+
+Usage: cargo run --release --example gallery -- NAME | all | FILE.gltf | FILE.glb | export DIR [OPTIONS]
+
+  NAME             room, car, lantern, letters, pinhole, facade, nested, neon or fog
+  all              all of them, and a contact sheet
+  FILE             a glTF scene; --bounces, --env and --size say what it does not
+  export DIR       writes all built-in scenes as glTF
+
+Options:
+  --seconds S             time for each image; their reference takes four times that [5]
+  --spp N                 samples a pixel instead of a time
+  --size WxH              pixels of an image [208x156]
+  --seed N                which random numbers are used [1]
+  --output PATH           folder for the pictures [docs/gallery], or for a FILE the .png [FILE.png]
+  --exr PATH              the last image that is rendered with fanlight in linear RGB, .exr
+
+For a FILE:
+  --portal-prefix PREFIX  meshes whose material's name starts with it are portals [window]
+  --env FILE              latitude-longitude environment, .hdr or .exr, or `none` [a clear sky with a sun]
+  --bounces N             surfaces that light may touch on its way [5]
+";
+
+/// What is to be done.
+pub(crate) enum Task {
+    Scene(String),
+    All,
+    File(PathBuf),
+    Export(PathBuf),
+}
+
+/// What was asked for.
+pub(crate) struct Arguments {
+    pub(crate) task: Task,
+    pub(crate) budget: Budget,
+    pub(crate) size: Option<[u32; 2]>,
+    pub(crate) seed: u32,
+    pub(crate) output: Option<PathBuf>,
+    pub(crate) exr: Option<PathBuf>,
+    pub(crate) portal_prefix: String,
+    pub(crate) environment: Option<PathBuf>,
+    pub(crate) bounces: u32,
+}
+
+impl Arguments {
+    /// Reads the program's arguments. `None` if help was asked for.
+    pub(crate) fn parse() -> Result<Option<Self>, Error> {
+        let mut arguments = Self {
+            task: Task::All,
+            budget: Budget::Seconds(5.0),
+            size: None,
+            seed: 1,
+            output: None,
+            exr: None,
+            portal_prefix: "window".to_owned(),
+            environment: None,
+            bounces: 5,
+        };
+        let mut task = None;
+        let mut parser = lexopt::Parser::from_env();
+        while let Some(argument) = parser.next()? {
+            match argument {
+                Short('h') | Long("help") => return Ok(None),
+                Value(word) if task.is_none() => {
+                    task = Some(match word.to_str() {
+                        Some("all") => Task::All,
+                        Some("export") => Task::Export(parser.value()?.into()),
+                        Some(name) if !name.contains(['.', '/', '\\']) => Task::Scene(name.to_owned()),
+                        _ => Task::File(word.into()),
+                    });
+                }
+                Long("seconds") => arguments.budget = Budget::Seconds(parser.value()?.parse_with(duration)?),
+                Long("spp") => arguments.budget = Budget::Samples(parser.value()?.parse_with(positive)?),
+                Long("size") => arguments.size = Some(parser.value()?.parse_with(size)?),
+                Long("seed") => arguments.seed = parser.value()?.parse()?,
+                Long("output") => arguments.output = Some(parser.value()?.into()),
+                Long("exr") => arguments.exr = Some(parser.value()?.into()),
+                Long("portal-prefix") => arguments.portal_prefix = parser.value()?.string()?,
+                Long("env") => arguments.environment = Some(parser.value()?.into()),
+                Long("bounces") => arguments.bounces = parser.value()?.parse_with(positive)?,
+                _ => return Err(argument.unexpected().into()),
+            }
+        }
+        arguments.task = task.ok_or("say what to render: a scene's name, `all`, or a glTF file")?;
+        Ok(Some(arguments))
+    }
+}
+
+fn positive(number: &str) -> Result<u32, &'static str> {
+    number.parse().ok().filter(|&number| number > 0).ok_or("not a whole number above zero")
+}
+
+fn size(text: &str) -> Result<[u32; 2], &'static str> {
+    let side = |side: &str| side.parse().ok().filter(|side| (48..=8192).contains(side));
+    let sides = text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
+    sides.ok_or("not a size such as 640x480, with sides from 48 to 8192")
+}
+
+fn duration(number: &str) -> Result<f64, &'static str> {
+    number.parse().ok().filter(|&seconds: &f64| seconds.is_finite() && seconds > 0.0).ok_or("not a time in seconds")
+}

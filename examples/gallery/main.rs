@@ -1,0 +1,126 @@
+//! Renders a gallery of scenes without and with `fanlight` in the same time, and scenes from glTF files.
+//!
+//! `cargo run --release --example gallery -- --help` lists what can be asked for. The renderer is in [`render`]; what it
+//! takes to give it `fanlight`'s samplers is in `render/lighting.rs`, and what it takes to guide photons in
+//! `studies/emission.rs`.
+
+mod arguments;
+mod gltf;
+mod render;
+mod report;
+mod scenes;
+mod studies;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use arguments::{Arguments, Task};
+use image::RgbImage;
+use render::{Daylight, Error, Image, Model, Sky, read_rgb, write_rgb};
+use report::{Comparison, Effort, Picture};
+use scenes::Scene;
+
+/// Where pictures go if nothing else is said.
+const FOLDER: &str = "docs/gallery";
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse() {
+        Ok(Some(arguments)) => run(&arguments),
+        Ok(None) => {
+            print!("{}", arguments::HELP);
+            Ok(())
+        }
+        Err(error) => Err(format!("{error} (--help lists the options)").into()),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Error> {
+    let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from(FOLDER));
+    match &arguments.task {
+        Task::Export(folder) => export(folder),
+        Task::File(path) => render_file(path, arguments),
+        Task::All => {
+            let mut pairs = Vec::new();
+            for scene in &scenes::ALL {
+                pairs.push((scene.name, render_scene(scene, &folder, arguments)?));
+            }
+            report::save(&report::contact_sheet(&pairs), &folder.join("contact.png"))
+        }
+        Task::Scene(name) => {
+            let known = || scenes::ALL.map(|scene| scene.name).join(", ");
+            let scene = scenes::ALL.iter().find(|scene| scene.name == name);
+            let scene = scene.ok_or_else(|| format!("there is no scene `{name}`, but {}", known()))?;
+            render_scene(scene, &folder, arguments).map(drop)
+        }
+    }
+}
+
+fn effort(arguments: &Arguments) -> Effort {
+    Effort { budget: arguments.budget, seed: arguments.seed }
+}
+
+/// Renders a built-in scene, and writes its picture. Returns the two images of it.
+fn render_scene(scene: &Scene, folder: &Path, arguments: &Arguments) -> Result<[RgbImage; 2], Error> {
+    let mut model = (scene.model)();
+    resize(&mut model, arguments);
+    let comparison = studies::study(scene, &model, effort(arguments))?;
+    write(&comparison, scene.detail, &folder.join(scene.name).with_extension("png"), arguments)
+}
+
+fn render_file(path: &Path, arguments: &Arguments) -> Result<(), Error> {
+    let sky = match &arguments.environment {
+        Some(path) if path.as_os_str() == "none" => None,
+        Some(path) => Some(Sky::new(read_rgb(path)?)),
+        None => Some(Daylight::new().draw()),
+    };
+    let mut model = gltf::read(path, &arguments.portal_prefix, sky)?;
+    resize(&mut model, arguments);
+    let comparison = studies::without_and_with("file", &model, &[arguments.bounces], effort(arguments))?;
+    let picture = arguments.output.clone().unwrap_or_else(|| path.with_extension("png"));
+    write(&comparison, [0.5, 0.5], &picture, arguments).map(drop)
+}
+
+fn resize(model: &mut Model, arguments: &Arguments) {
+    if let Some(size) = arguments.size {
+        model.camera = model.camera.sized(size);
+    }
+}
+
+/// Writes what a comparison came to: the first image next to the last one.
+fn write(
+    comparison: &Comparison,
+    detail: [f32; 2],
+    path: &Path,
+    arguments: &Arguments,
+) -> Result<[RgbImage; 2], Error> {
+    let Comparison { images, reference, seen } = comparison;
+    let [Some(first), Some(last)] = [images.first(), images.last()] else { return Err("nothing was rendered".into()) };
+    let [first, last, best] = [first, last, reference.image()].map(|image| sum(image, seen));
+    let picture = Picture::exposed_by(reference.image());
+    report::save(&picture.pair([&first, &last], &best, detail), path)?;
+    if let Some(path) = &arguments.exr {
+        write_rgb(path, &last)?;
+    }
+    Ok([&first, &last].map(|image| picture.develop(image)))
+}
+
+/// Writes all built-in scenes as glTF.
+fn export(folder: &Path) -> Result<(), Error> {
+    for scene in &scenes::ALL {
+        let path = gltf::write(folder, scene.name, &(scene.model)())?;
+        println!("{}", path.display());
+    }
+    Ok(())
+}
+
+fn sum(a: &Image, b: &Image) -> Image {
+    let pixels = a.pixels.iter().zip(&b.pixels).map(|(a, b)| a + b).collect();
+    Image { pixels, ..*a }
+}

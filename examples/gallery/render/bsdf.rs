@@ -1,0 +1,96 @@
+//! How a surface scatters light: Lambert's lobe on both sides, and Phong's on one.
+
+use core::f32::consts::{FRAC_1_PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+use super::material::Lobe;
+use super::sky::LUMINANCE;
+
+/// The scattering of one point for one outgoing direction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bsdf {
+    reflected: Vec3,
+    transmitted: Vec3,
+    glossy: Vec3,
+    exponent: f32,
+    /// To the side of the outgoing direction.
+    normal: Vec3,
+    mirror: Vec3,
+    /// With which probability each of the three lobes is sampled.
+    shares: [f32; 3],
+}
+
+impl Bsdf {
+    /// The scattering towards `outgoing`, which is on the side of the normal.
+    pub(crate) fn new(lobe: Lobe, color: Vec3, normal: Vec3, outgoing: Vec3) -> Self {
+        let (mut reflected, mut transmitted, mut glossy, mut exponent) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, 0.0);
+        match lobe {
+            Lobe::Diffuse => reflected = color,
+            Lobe::Clear => {}
+            Lobe::Translucent(share) => (reflected, transmitted) = ((1.0 - share) * color, share * color),
+            Lobe::Glossy(sharpness) => (glossy, exponent) = (color, sharpness),
+        }
+        let weights = [reflected, transmitted, glossy].map(|color| color.dot(LUMINANCE));
+        let sum = weights.iter().sum::<f32>().max(f32::MIN_POSITIVE);
+        let mirror = 2.0 * normal.dot(outgoing) * normal - outgoing;
+        Self { reflected, transmitted, glossy, exponent, normal, mirror, shares: weights.map(|weight| weight / sum) }
+    }
+
+    /// To the side of the outgoing direction.
+    pub(crate) const fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
+    /// Whether light comes through from behind.
+    pub(crate) fn transmits(&self) -> bool {
+        self.shares[1] > 0.0
+    }
+
+    /// Share of the radiance from a direction that is scattered, per solid angle: the cosine is in it.
+    pub(crate) fn value(&self, incoming: Vec3) -> Vec3 {
+        let cosine = self.normal.dot(incoming);
+        if cosine <= 0.0 {
+            return -cosine * FRAC_1_PI * self.transmitted;
+        }
+        let glossy = match self.shares[2] {
+            0.0 => Vec3::ZERO,
+            _ => self.glossy * ((self.exponent + 2.0) / TAU * self.phong(incoming)),
+        };
+        cosine * (FRAC_1_PI * self.reflected + glossy)
+    }
+
+    /// A direction with the density of [`pdf`](Self::pdf).
+    pub(crate) fn sample(&self, [choice, u, v]: [f32; 3]) -> Vec3 {
+        let [reflected, transmitted, _] = self.shares;
+        if choice < reflected {
+            around(self.normal, u.sqrt(), v)
+        } else if choice < reflected + transmitted {
+            around(-self.normal, u.sqrt(), v)
+        } else {
+            around(self.mirror, u.powf(1.0 / (self.exponent + 1.0)), v)
+        }
+    }
+
+    /// Density per solid angle of sampled directions.
+    pub(crate) fn pdf(&self, incoming: Vec3) -> f32 {
+        let cosine = self.normal.dot(incoming);
+        let diffuse = if cosine > 0.0 { self.shares[0] } else { self.shares[1] };
+        let glossy = match self.shares[2] {
+            0.0 => 0.0,
+            share => share * (self.exponent + 1.0) / TAU * self.phong(incoming),
+        };
+        diffuse * cosine.abs() * FRAC_1_PI + glossy
+    }
+
+    fn phong(&self, incoming: Vec3) -> f32 {
+        self.mirror.dot(incoming).max(0.0).powf(self.exponent)
+    }
+}
+
+/// The unit vector at an angle of this cosine around an axis.
+fn around(axis: Vec3, cosine: f32, turn: f32) -> Vec3 {
+    let disc = (1.0 - cosine * cosine).max(0.0).sqrt() * Vec2::from_angle(TAU * turn);
+    let (tangent, bitangent) = axis.any_orthonormal_pair();
+    (disc.x * tangent + disc.y * bitangent + cosine * axis).normalize()
+}

@@ -1,0 +1,74 @@
+//! A scene as it is described: by a file, or by one of the built-in generators.
+
+use super::alloc::sync::Arc;
+
+use glam::Vec3;
+
+use super::bitmap::Bitmap;
+use super::camera::Camera;
+use super::material::Material;
+use super::mesh::Mesh;
+use super::sky::Sky;
+
+/// Fog that is the same everywhere in a box.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fog {
+    pub(crate) low: Vec3,
+    pub(crate) high: Vec3,
+    /// How much of the light is scattered, per length.
+    pub(crate) density: f32,
+}
+
+/// Everything that a picture is made of.
+#[derive(Clone)]
+pub(crate) struct Model {
+    pub(crate) meshes: Vec<Mesh>,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) bitmaps: Vec<Bitmap>,
+    pub(crate) camera: Camera,
+    /// What is seen outside; nothing if there is none.
+    pub(crate) sky: Option<Arc<Sky>>,
+    /// Texels a side of the sky's image that guides the sampling; as many as it has itself if there is no number.
+    pub(crate) guide_texels: Option<usize>,
+    pub(crate) fog: Option<Fog>,
+    /// Materials whose names start with this are portals.
+    pub(crate) portal_prefix: String,
+}
+
+impl Model {
+    /// An empty scene.
+    pub(crate) fn new(camera: Camera, sky: Option<Sky>) -> Self {
+        Self {
+            meshes: Vec::new(),
+            materials: Vec::new(),
+            bitmaps: Vec::new(),
+            camera,
+            sky: sky.map(Arc::new),
+            guide_texels: None,
+            fog: None,
+            portal_prefix: "window".to_owned(),
+        }
+    }
+
+    /// Adds a material; returns an empty mesh of it.
+    pub(crate) fn material(&mut self, material: Material) -> Mesh {
+        self.materials.push(material);
+        Mesh::of(self.materials.len() - 1)
+    }
+
+    /// Adds an image.
+    pub(crate) fn bitmap(&mut self, bitmap: Bitmap) -> usize {
+        self.bitmaps.push(bitmap);
+        self.bitmaps.len() - 1
+    }
+
+    /// Adds a mesh.
+    pub(crate) fn add(&mut self, mesh: Mesh) {
+        self.meshes.push(mesh);
+    }
+
+    /// Whether a mesh was flagged as a portal by the name of its material.
+    pub(crate) fn is_portal(&self, mesh: &Mesh) -> bool {
+        self.materials[mesh.material].name.starts_with(&self.portal_prefix)
+    }
+}

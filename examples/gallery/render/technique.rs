@@ -1,0 +1,116 @@
+//! The ways in which directions to light are found, next to the scattering of the surface itself.
+
+use super::Error;
+use super::bsdf::Bsdf;
+use super::lighting::{Guide, Illumination, Lights, LightsAt, Proposal};
+use super::model::Model;
+use super::scene::Point;
+use super::texel_table::TexelTable;
+
+/// How points on lights are chosen.
+pub(crate) enum LightChoice {
+    /// Not at all.
+    None,
+    /// By what they send to the shading point.
+    Fanlight,
+    /// The same, and each sample with the density of the one point that was drawn. Wrong where a ray crosses
+    /// several portals.
+    Single,
+    /// From one table for the whole scene, emitters only.
+    Table(TexelTable),
+}
+
+/// The lights of a scene, and which techniques are used to find them.
+pub(crate) struct Techniques {
+    pub(crate) lights: Lights,
+    guide: Option<Guide>,
+    pub(crate) choice: LightChoice,
+    /// At how many vertices of a path points on lights are chosen.
+    pub(crate) vertices: u32,
+    /// Whether one ray of light is traced for each path, for the path's vertices to connect to.
+    pub(crate) photons: bool,
+}
+
+impl Techniques {
+    /// What a path tracer has that knows no portals: the sky's bright parts, and emitters by area and radiance.
+    pub(crate) fn without(model: &Model) -> Result<Self, Error> {
+        let table = TexelTable::areas(model);
+        let choice = if table.is_empty() { LightChoice::None } else { LightChoice::Table(table) };
+        let lights = Lights::new(model, Illumination::default())?;
+        Ok(Self { lights, guide: None, choice, vertices: u32::MAX, photons: false })
+    }
+
+    /// The same with `fanlight`: at the point that the camera sees by choosing points on lights, at those behind it
+    /// by rays of light that are traced from where they start.
+    pub(crate) fn with(model: &Model) -> Result<Self, Error> {
+        let lights = Lights::new(model, Illumination::default())?;
+        let guide = Guide::new(model)?;
+        Ok(Self { lights, guide, choice: LightChoice::Fanlight, vertices: 1, photons: true })
+    }
+
+    /// The same with another way to choose points on lights.
+    pub(crate) fn choosing(self, choice: LightChoice) -> Self {
+        Self { choice, ..self }
+    }
+
+    /// The same with other lights.
+    pub(crate) fn with_lights(self, lights: Lights) -> Self {
+        Self { lights, ..self }
+    }
+
+    /// The lights as seen from a point of a surface, the path's vertex of that number.
+    pub(crate) fn lights_at(&self, point: &Point, bsdf: &Bsdf, vertex: u32) -> ChoiceAt<'_> {
+        match &self.choice {
+            LightChoice::Fanlight if vertex <= self.vertices => {
+                ChoiceAt::Fanlight(self.lights.at_surface(point.position, bsdf))
+            }
+            LightChoice::Single => ChoiceAt::Single(self.lights.at_surface(point.position, bsdf)),
+            LightChoice::Table(table) => ChoiceAt::Table(table, point.position),
+            _ => ChoiceAt::None,
+        }
+    }
+
+    /// The lights as seen from a point in fog.
+    pub(crate) fn lights_in_fog(&self, position: glam::Vec3) -> ChoiceAt<'_> {
+        match &self.choice {
+            LightChoice::Fanlight => ChoiceAt::Fanlight(self.lights.at_volume(position)),
+            LightChoice::Table(table) => ChoiceAt::Table(table, position),
+            _ => ChoiceAt::None,
+        }
+    }
+
+    /// The paper that paths are led to, as seen from a point of a surface.
+    pub(crate) fn guide_at(&self, point: &Point, bsdf: &Bsdf) -> Option<LightsAt<'_>> {
+        self.guide.as_ref().filter(|_| !bsdf.transmits()).map(|guide| guide.at(point.position, bsdf))
+    }
+}
+
+/// How points on lights are chosen for one shading point.
+pub(crate) enum ChoiceAt<'a> {
+    None,
+    Fanlight(LightsAt<'a>),
+    Single(LightsAt<'a>),
+    Table(&'a TexelTable, glam::Vec3),
+}
+
+impl ChoiceAt<'_> {
+    /// A direction to a light.
+    pub(crate) fn sample(&self, u: [f32; 3]) -> Option<Proposal> {
+        match self {
+            Self::None => None,
+            Self::Fanlight(lights) => lights.sample(u),
+            Self::Single(lights) => lights.sample_single(u),
+            Self::Table(table, position) => table.sample(*position, u),
+        }
+    }
+
+    /// Density per solid angle of a direction under [`sample`](Self::sample), which leads to an emitter's point, or to
+    /// the sky if that is `None`.
+    pub(crate) fn pdf(&self, direction: glam::Vec3, from: Option<&Point>) -> f32 {
+        match self {
+            Self::None | Self::Single(_) => 0.0,
+            Self::Fanlight(lights) => lights.pdf(direction),
+            Self::Table(table, _) => from.map_or(0.0, |point| table.pdf(direction, point)),
+        }
+    }
+}

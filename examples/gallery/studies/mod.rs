@@ -1,0 +1,44 @@
+//! What is measured in each scene.
+
+mod emission;
+mod facade;
+mod letters;
+mod neon;
+mod nested;
+
+use crate::render::{Error, Model, Techniques, World};
+use crate::report::{Comparison, Contestant, Effort, compare};
+use crate::scenes::Scene;
+
+/// Renders a scene without and with `fanlight`, and finds out what else there is to be found out in it.
+pub(crate) fn study(scene: &Scene, model: &Model, effort: Effort) -> Result<Comparison, Error> {
+    match scene.name {
+        "letters" => letters::study(model, effort),
+        "facade" => facade::study(model, effort),
+        "nested" => nested::study(model, effort),
+        "neon" => neon::study(model, effort),
+        name => without_and_with(name, model, scene.bounces, effort),
+    }
+}
+
+/// Renders a model without and with `fanlight`, for each number of bounces. Returns the last comparison.
+pub(crate) fn without_and_with(
+    name: &str,
+    model: &Model,
+    bounces: &[u32],
+    effort: Effort,
+) -> Result<Comparison, Error> {
+    let world = World::new(model);
+    let contestants =
+        [contestant("without", Techniques::without(model)?), contestant("with fanlight", Techniques::with(model)?)];
+    let mut last = Err("no number of bounces was asked for".into());
+    for &bounces in bounces {
+        let title = format!("{name}, {bounces} bounce{}", if bounces == 1 { "" } else { "s" });
+        last = Ok(compare(&title, &world, model.camera, bounces, &contestants, effort)?);
+    }
+    last
+}
+
+fn contestant(name: &str, techniques: Techniques) -> Contestant {
+    Contestant { name: name.to_owned(), techniques }
+}
