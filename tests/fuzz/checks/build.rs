@@ -111,9 +111,9 @@ impl Soup {
         };
         let indices = (0..reader.below(12)).map(|_| [(); 3].map(|()| index(reader))).collect();
         let uvs = (0..vertices).map(|_| Vec2::new(reader.float(), reader.float())).collect();
-        let weight = if reader.byte() % 2 == 0 { Ok(reader.float()) } else { Err(reader.below(3)) };
-        let sides = if reader.byte() % 2 == 0 { Sides::One } else { Sides::Two };
-        Self { positions, indices, uvs, weight, sides, portal: reader.byte() % 2 == 0 }
+        let weight = if reader.byte().is_multiple_of(2) { Ok(reader.float()) } else { Err(reader.below(3)) };
+        let sides = if reader.byte().is_multiple_of(2) { Sides::One } else { Sides::Two };
+        Self { positions, indices, uvs, weight, sides, portal: reader.byte().is_multiple_of(2) }
     }
 
     fn mesh(&self, textures: &[TextureId]) -> Mesh<'_> {

@@ -31,7 +31,7 @@ pub(crate) fn scene(data: &[u8]) {
 pub(crate) fn bytes(data: &[u8]) {
     let mut reader = Reader::new(data);
     let mut bytes;
-    if reader.byte() % 4 == 0 {
+    if reader.byte().is_multiple_of(4) {
         bytes = data[1.min(data.len())..].to_vec();
     } else {
         bytes = build::some_lights(reader.byte()).to_bytes();
@@ -39,7 +39,7 @@ pub(crate) fn bytes(data: &[u8]) {
             let at = reader.bits() as usize % bytes.len();
             bytes[at] = reader.byte();
         }
-        if reader.byte() % 8 == 0 {
+        if reader.byte().is_multiple_of(8) {
             bytes.truncate(reader.bits() as usize % bytes.len());
         }
     }
