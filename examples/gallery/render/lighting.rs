@@ -21,6 +21,8 @@ pub(crate) struct Proposal {
     pub(crate) direction: Vec3,
     /// The direction's density per solid angle, over all ways in which the same sampler could have chosen it.
     pub(crate) pdf: f32,
+    /// How far away the point is that alone the density is for; `None` if it is for all along the direction.
+    pub(crate) distance: Option<f32>,
 }
 
 /// The emitters, and the sky with the portals that it is seen through.
@@ -74,7 +76,7 @@ impl Lights {
     /// A direction to the sky, bright parts more often than dark ones.
     pub(crate) fn sample_environment(&self, u: [f32; 2]) -> Option<Proposal> {
         let sample = self.sampler.environment().sample(u)?;
-        Some(Proposal { direction: sample.direction, pdf: sample.pdf })
+        Some(Proposal { direction: sample.direction, pdf: sample.pdf, distance: None })
     }
 
     /// Density per solid angle of a direction under [`sample_environment`](Self::sample_environment).
@@ -119,7 +121,7 @@ impl LightsAt<'_> {
         let sample = self.0.sample(u)?;
         // Not `sample.pdf`, the density of this one point: were there another portal behind this one, the same
         // direction could have been found through that.
-        Some(Proposal { direction: sample.direction, pdf: self.0.pdf_sample_direction(&sample) })
+        Some(Proposal { direction: sample.direction, pdf: self.0.pdf_sample_direction(&sample), distance: None })
     }
 
     /// Density per solid angle of a direction under [`sample`](Self::sample).
@@ -129,7 +131,7 @@ impl LightsAt<'_> {
 
     /// A direction with the density of the one point that was drawn: what to compare with, not what to use.
     pub(crate) fn sample_single(&self, u: [f32; 3]) -> Option<Proposal> {
-        self.0.sample(u).map(|sample| Proposal { direction: sample.direction, pdf: sample.pdf })
+        self.0.sample(u).map(|sample| Proposal { direction: sample.direction, pdf: sample.pdf, distance: None })
     }
 }
 

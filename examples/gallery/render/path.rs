@@ -13,6 +13,9 @@ use super::scene::Point;
 use super::technique::{ChoiceAt, Techniques};
 use super::world::World;
 
+/// How many offsets of rays apart two points may be that are the same one.
+const SAME: f32 = 20.0;
+
 /// Estimates the radiance that arrives along a ray after being scattered, or, for no bounces at all, without.
 pub(crate) struct PathTracer<'a> {
     world: &'a World,
@@ -125,7 +128,7 @@ impl<'a> PathTracer<'a> {
 
     /// Direct light along a direction that the environment or the lights proposed.
     fn along(&self, x: &Vertex<'_>, proposal: &Proposal, by_environment: bool) -> Vec3 {
-        let &Proposal { direction, pdf } = proposal;
+        let &Proposal { direction, pdf, distance } = proposal;
         let value = x.value(direction);
         if value == Vec3::ZERO {
             return value;
@@ -136,7 +139,11 @@ impl<'a> PathTracer<'a> {
         } else {
             self.world.arriving(start, direction)
         };
-        if arrival.radiance == Vec3::ZERO {
+        // Another point of an emitter may be in front of the one that was drawn.
+        let hidden = distance.zip(arrival.from).is_some_and(|(drawn, met)| {
+            (x.position() + drawn * direction).distance(met.position) > SAME * self.world.scene.offset()
+        });
+        if arrival.radiance == Vec3::ZERO || hidden {
             return Vec3::ZERO;
         }
         let lights_pdf = (!by_environment).then_some(pdf);

@@ -107,7 +107,7 @@ impl TexelTable {
         let distance2 = step.length_squared();
         let direction = step / distance2.sqrt();
         let pdf = pdf_area as f32 * distance2 / normal.dot(direction).abs();
-        (pdf.is_finite() && pdf > 0.0).then_some(Proposal { direction, pdf })
+        (pdf.is_finite() && pdf > 0.0).then_some(Proposal { direction, pdf, distance: Some(distance2.sqrt()) })
     }
 
     /// Density per solid angle of a direction that leads to a point of an emitter.
