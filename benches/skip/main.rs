@@ -189,15 +189,15 @@ fn emitters(count: usize, sent: fn(usize) -> bool) -> LightSampler {
     builder.build().expect("few triangles")
 }
 
-/// Lamps above the unit cube that face down, or, two of three, up.
-fn ceiling(most_face_up: bool) -> LightSampler {
+/// Lamps above the unit cube that face down or up.
+fn ceiling(face_up: bool) -> LightSampler {
     let mut builder = LightSampler::builder();
     let mut pcg = Pcg32::new(5, 5);
     for _ in 0..20_000 {
-        let x = 3.0 * pcg.f() as f32 - 1.0;
-        let corner = Vec3::new(x, 3.0 * pcg.f() as f32 - 1.0, 2.0);
+        let [x, y] = [(); 2].map(|()| 3.0 * pcg.f() as f32 - 1.0);
+        let corner = Vec3::new(x, y, 2.0);
         let positions = [corner, corner + 0.01 * Vec3::Y, corner + 0.01 * Vec3::X];
-        let indices = if most_face_up && x < 1.0 { [0, 2, 1] } else { [0, 1, 2] };
+        let indices = if face_up { [0, 2, 1] } else { [0, 1, 2] };
         builder.add_mesh(&Mesh::emitter(&positions, &[indices])).expect("a valid lamp");
     }
     builder.build().expect("few triangles")
