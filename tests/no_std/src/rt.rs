@@ -12,7 +12,7 @@ unsafe extern "C" {
     fn abort() -> !;
 }
 
-const HEAP: usize = 16 << 20;
+const HEAP: usize = 64 << 20;
 
 /// Hands out memory from the front of a fixed block and never takes any back.
 #[repr(align(64))]
