@@ -64,7 +64,8 @@
 //! - **Unbiased.** The density is above zero wherever something can arrive: an average over texels may be small, but
 //!   it is zero only if all of them are black. Where nothing can arrive it is exactly zero.
 //! - **Safe for any input.** Bad input is an [`Error`] that names the mesh, the element and the value. No panic, NaN
-//!   or infinity comes out of sampling, and no unsafe code is in the crate.
+//!   or infinity comes out of sampling, and the only unsafe code selects vector instructions and
+//!   prefetches memory, in one module.
 //! - **Low noise, then speed.** No work is done for what the scene does not have.
 //! - **Readable.** `docs/ARCHITECTURE.md` explains the algorithm before the code.
 //!
