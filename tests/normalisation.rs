@@ -34,8 +34,8 @@ fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[Lig
     let count = scene.triangles().count();
     // The more probable a triangle, the finer what may be missed in it.
     let least_depth = |pmf: f64| match pmf {
-        _ if count >= 1000 => 2,
         pmf if pmf > 0.05 => 6,
+        pmf if pmf < 1e-3 && count >= 1000 => 2,
         _ => 4,
     };
     let probes = probes(scene, samples);
