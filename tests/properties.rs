@@ -1,8 +1,11 @@
 //! Properties that hold for any scene that a builder accepts.
 
 use approx::assert_relative_eq;
-use fanlight::{Environment, Filter, LightSampler, LightSamplerView, Mesh, ShadingPoint, Sides, Texture, Weight};
-use glam::{Vec2, Vec3};
+use fanlight::{
+    Environment, Filter, Hit, LightSampler, LightSamplerView, Mesh, Receiver, ShadingPoint, Sides, Texture, TriangleId,
+    Weight,
+};
+use glam::{DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 
 /// Numbers that are often equal, tiny, huge or zero.
@@ -15,6 +18,18 @@ fn coordinate() -> impl Strategy<Value = f32> {
 
 fn point() -> impl Strategy<Value = Vec3> {
     [coordinate(), coordinate(), coordinate()].prop_map(Vec3::from)
+}
+
+/// Mostly three points; now and then a sliver, a repeated corner, or a triangle far from everything.
+fn triangle() -> impl Strategy<Value = [Vec3; 3]> {
+    let barycentric = [0.0f32..1.0, -1e-6f32..1e-6];
+    ([point(), point(), point()], barycentric, 0..8).prop_map(|([a, b, c], [along, off], kind)| match kind {
+        0 => [a, b, a + along * (b - a) + off * (c - a)],
+        1 => [a, b, b],
+        2 => [a, b, c].map(|p| p + 1e5),
+        3 => [a, b, c].map(|p| 1e-6 * p),
+        _ => [a, b, c],
+    })
 }
 
 fn direction() -> impl Strategy<Value = Vec3> {
@@ -35,11 +50,35 @@ type Soup = Vec<([Vec3; 3], [[f32; 2]; 3], bool, bool)>;
 fn soup() -> impl Strategy<Value = Soup> {
     let uv = [-3.0f32..3.0, -3.0f32..3.0];
     let uvs = [uv.clone(), uv.clone(), uv];
-    prop::collection::vec(([point(), point(), point()], uvs, any::<bool>(), any::<bool>()), 1..20)
+    prop::collection::vec((triangle(), uvs, any::<bool>(), any::<bool>()), 1..20)
 }
 
 fn texels() -> impl Strategy<Value = Vec<f32>> {
     prop::collection::vec(prop_oneof![2 => Just(0.0f32), 2 => 0.0f32..2.0, 1 => Just(1e6f32)], 16)
+}
+
+/// Corners of a triangle seen from a point.
+fn seen(corners: [Vec3; 3], x: &ShadingPoint) -> [DVec3; 3] {
+    corners.map(|p| p.as_dvec3() - x.position.as_dvec3())
+}
+
+/// Cosine of a receiver, clamped or absolute; one in a volume.
+fn cosine(x: &ShadingPoint, direction: DVec3) -> f64 {
+    match x.receiver {
+        Receiver::Surface(normal) => normal.as_dvec3().dot(direction).max(0.0),
+        Receiver::Transmissive(normal) => normal.as_dvec3().dot(direction).abs(),
+        Receiver::Volume => 1.0,
+    }
+}
+
+/// Least barycentric coordinate of where a ray crosses the plane of a triangle, and the second and third one.
+fn crossing([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<(f64, [f64; 2])> {
+    let normal = (b - a).cross(c - a);
+    let [na, nb, nc] = [b.cross(c), c.cross(a), a.cross(b)].map(|n| n.dot(direction));
+    let whole = na + nb + nc;
+    let barycentrics = [na / whole, nb / whole, nc / whole];
+    let ahead = normal.dot(a) / normal.dot(direction) > 0.0;
+    (ahead && whole != 0.0).then(|| (barycentrics.into_iter().fold(1.0, f64::min), [barycentrics[1], barycentrics[2]]))
 }
 
 /// The lights of a soup in a sky of eight by four texels, with all coordinates multiplied.
@@ -74,6 +113,64 @@ proptest! {
                 prop_assert!(sample.pdf.is_normal() && sample.pdf_area > 0.0 && sample.distance > 0.0);
                 prop_assert!(lights.pdf_sample_direction(&x, &sample) >= sample.pdf);
                 assert_relative_eq!(sample.direction.length(), 1.0, max_relative = 1e-5);
+            }
+        }
+    }
+
+    /// Untextured triangles of a sky that is nowhere black: they send light wherever a side that is lit is seen.
+    #[test]
+    fn what_sends_light_can_be_drawn(
+        soup in soup(), x in shading_point(), places in prop::collection::vec([0.0f64..1.0, 0.0f64..1.0], 30),
+    ) {
+        let soup: Soup = soup.into_iter().map(|(corners, uvs, portal, _)| (corners, uvs, portal, false)).collect();
+        let lights = build(&soup, &[1.0; 16], &[1.0; 16], 1.0);
+        for ((number, (corners, ..)), [u, v]) in soup.iter().enumerate().cycle().zip(places) {
+            let [a, b, c] = seen(*corners, &x);
+            let [b1, b2] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+            let (at, normal) = (a + (b - a) * b1 + (c - a) * b2, (b - a).cross(c - a));
+            let facing = -normal.normalize_or_zero().dot(at.normalize_or_zero());
+            let lit = if number % 3 == 0 { facing.abs() } else { facing };
+            // Nearer to a plane, or thinner, than what rounding may hide.
+            let size = corners.iter().fold(0.0f32, |size, p| size.max(p.abs().max_element()));
+            let is_thin = normal.length() < 1e-5 * f64::from(size).powi(2);
+            if lit < 1e-3 || cosine(&x, at.normalize()) < 1e-3 || is_thin || at.length() < 1e-5 * f64::from(size) {
+                continue;
+            }
+            let hit = Hit {
+                triangle: TriangleId { mesh: number as u32, triangle: 0 },
+                barycentrics: [b1 as f32, b2 as f32],
+            };
+            prop_assert!(lights.pdf(&x, &hit) > 0.0, "{hit:?} sends light to {x:?}");
+        }
+    }
+
+    #[test]
+    fn the_density_of_a_direction_is_the_sum_over_what_it_crosses(
+        soup in soup(), texels in texels(), sky in texels(), x in shading_point(), places in prop::collection::vec(point(), 10),
+    ) {
+        let lights = build(&soup, &texels, &sky, 1.0);
+        for place in places {
+            let direction = (place - x.position).normalize_or(Vec3::X);
+            let mut sum = 0.0;
+            let mut is_clear = true;
+            for (number, (corners, ..)) in soup.iter().enumerate() {
+                let vertices = seen(*corners, &x);
+                let size = vertices.iter().fold(0.0f64, |size, p| size.max(p.length()));
+                let normal = (vertices[1] - vertices[0]).cross(vertices[2] - vertices[0]);
+                let height = normal.normalize_or_zero().dot(vertices[0]).abs();
+                let Some((least, barycentrics)) = crossing(vertices, direction.as_dvec3()) else { continue };
+                // Near an edge rounding decides, and near anything seen edge on or thin as a needle.
+                let is_thin = normal.length() < 1e-3 * size * size || height < 1e-3 * size;
+                is_clear &= least.abs() > 1e-3 && (least < -1.0 || !is_thin);
+                if least > 0.0 {
+                    let triangle = TriangleId { mesh: number as u32, triangle: 0 };
+                    sum += lights.pdf(&x, &Hit { triangle, barycentrics: barycentrics.map(|b| b as f32) });
+                }
+            }
+            if is_clear {
+                let found = lights.pdf_direction(&x, direction);
+                prop_assert_eq!(found > 0.0, sum > 0.0);
+                assert_relative_eq!(found, sum, max_relative = 1e-3);
             }
         }
     }

@@ -185,7 +185,8 @@ impl Scene {
         scene.sky = Sky::random(pcg, sky);
         scene.rotation = pcg.rotation();
         let kinds = [Illumination::Conservative, Illumination::PointToPoint, Illumination::Boundary];
-        scene.illumination = kinds[pcg.below(3)];
+        // Every other scene has the default.
+        scene.illumination = kinds.get(pcg.below(2 * kinds.len())).copied().unwrap_or_default();
         let first = pcg.below(4);
         let parts = triangles.min(4);
         for part in 0..parts {
