@@ -5,6 +5,7 @@
 //! (conservatively, for portals), and which direction to trace.
 
 mod build;
+mod clipped_square;
 mod descend;
 mod directions;
 mod footprint;
@@ -12,7 +13,6 @@ mod lat_long;
 mod opening;
 mod parts;
 mod polygon;
-mod polygon32;
 mod pyramid;
 mod resample;
 mod rotation;

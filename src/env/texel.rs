@@ -7,8 +7,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
+use super::clipped_square::ClippedSquare;
 use super::opening::Opening;
-use super::polygon32::Polygon;
 use crate::warp::equal_area::square_to_sphere;
 
 /// Covers the rounding of the map, of the rotation and of the planes.
@@ -44,7 +44,7 @@ pub(super) enum Cut {
     Nothing,
     All,
     /// In units of the texel, around its centre, and its area.
-    Part(Polygon, f32),
+    Part(ClippedSquare, f32),
 }
 
 impl Cut {
@@ -106,10 +106,10 @@ impl SunTexel {
                 return Cut::Nothing;
             }
             if line[0] < reach {
-                part = Some(part.unwrap_or_else(Polygon::square).clip(line));
+                part = Some(part.unwrap_or_else(ClippedSquare::whole).clip(line));
             }
         }
-        match part.map(|polygon: Polygon| (polygon, polygon.area())) {
+        match part.map(|polygon: ClippedSquare| (polygon, polygon.area())) {
             None => Cut::All,
             Some((polygon, area)) if area > 0.0 => Cut::Part(polygon, area),
             Some(_) => Cut::Nothing,

@@ -1,4 +1,4 @@
-//! The part of a square that lines leave over, in single precision, for shading points.
+//! What lines leave over of a square. In single precision, for shading points; building has its own polygons.
 
 use crate::warp::triangle::square_to_triangle;
 use crate::warp::{Variate, pick, sum};
@@ -6,16 +6,16 @@ use crate::warp::{Variate, pick, sum};
 /// A square that is cut by three lines has at most seven vertices; rounding could add one.
 const CAPACITY: usize = 8;
 
-/// A convex polygon.
+/// The convex rest of a square.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Polygon {
+pub(super) struct ClippedSquare {
     vertices: [[f32; 2]; CAPACITY],
     len: usize,
 }
 
-impl Polygon {
+impl ClippedSquare {
     /// The square of unit side around the origin.
-    pub(super) fn square() -> Self {
+    pub(super) fn whole() -> Self {
         let mut vertices = [[0.0; 2]; CAPACITY];
         vertices[..4].copy_from_slice(&[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]);
         Self { vertices, len: 4 }
@@ -97,9 +97,9 @@ mod tests {
 
     #[test]
     fn clipped_areas_and_points() {
-        let corner = Polygon::square().clip([0.25, -1.0, -1.0]);
+        let corner = ClippedSquare::whole().clip([0.25, -1.0, -1.0]);
         assert!((corner.area() - (1.0 - 0.5 * 0.75 * 0.75)).abs() < 1e-6);
-        assert_eq!(Polygon::square().clip([-2.0, 1.0, 1.0]).area(), 0.0);
+        assert_eq!(ClippedSquare::whole().clip([-2.0, 1.0, 1.0]).area(), 0.0);
         let mut pcg = Pcg32::new(1, 77);
         let mut left = 0;
         for i in 0..20_000 {
