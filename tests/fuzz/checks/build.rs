@@ -1,5 +1,7 @@
 //! Scenes from a fuzzer's bytes.
 
+use std::sync::OnceLock;
+
 use fanlight::{Environment, Filter, Illumination, LightSampler, Mesh, Sides, Texture, TextureId, Weight, Wrap};
 use glam::{Mat3, Vec2, Vec3};
 
@@ -25,8 +27,14 @@ pub(crate) fn lights(reader: &mut Reader<'_>) -> Option<LightSampler> {
     builder.build().ok()
 }
 
-/// Lights that are accepted, of several kinds.
-pub(crate) fn some_lights(kind: u8) -> LightSampler {
+/// The bytes of lights that are accepted, of several kinds. Each is built once only.
+pub(crate) fn some_bytes(kind: u8) -> &'static [u8] {
+    static BYTES: [OnceLock<Vec<u8>>; 16] = [const { OnceLock::new() }; 16];
+    let kind = kind % 16;
+    BYTES[usize::from(kind)].get_or_init(|| some_lights(kind).to_bytes())
+}
+
+fn some_lights(kind: u8) -> LightSampler {
     let texels = [0.0, 1.0, 0.5, 2.0];
     let sky = [0.5, 1.0, 0.0, 100.0, 0.1, 0.2, 0.3, 0.4];
     let positions: Vec<Vec3> = (0..12_u8).map(|i| Vec3::from([i % 3, i % 4, i % 5].map(f32::from))).collect();

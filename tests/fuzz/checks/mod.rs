@@ -34,7 +34,7 @@ pub(crate) fn bytes(data: &[u8]) {
     if reader.byte().is_multiple_of(4) {
         bytes = data[1.min(data.len())..].to_vec();
     } else {
-        bytes = build::some_lights(reader.byte()).to_bytes();
+        bytes = build::some_bytes(reader.byte()).to_vec();
         for _ in 0..reader.below(8) {
             let at = reader.bits() as usize % bytes.len();
             bytes[at] = reader.byte();
