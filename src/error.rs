@@ -53,6 +53,10 @@ pub(crate) enum Kind {
     TextureCoordinateCount { mesh: usize, found: usize, vertices: usize },
     /// A constant weight of a mesh that is NaN, negative or too large.
     Weight { mesh: usize, value: f32, limit: f32 },
+    /// What a function says it lies between over a box of texture coordinates is no range of weights.
+    ProceduralBounds { mesh: usize, region: [[f32; 2]; 2], bounds: [f32; 2] },
+    /// What a function gives at a place is not within the bound that it gives over a box around it.
+    ProceduralWeight { mesh: usize, uv: [f32; 2], value: f32, region: [[f32; 2]; 2], bounds: [f32; 2] },
     /// A handle to a texture that this builder did not give out.
     UnknownTexture { mesh: usize, texture: usize, textures: usize },
     /// A mesh that a sampler does not hold.
@@ -102,6 +106,14 @@ impl fmt::Display for Error {
             }
             Kind::Weight { mesh, value, limit } => {
                 write!(f, "mesh {mesh}: the weight is {value}, but must be from 0 to {limit:e}")
+            }
+            Kind::ProceduralBounds { mesh, region: [[u0, v0], [u1, v1]], bounds: [min, max] } => {
+                write!(f, "mesh {mesh}: the bounds of its weight over uv ({u0}, {v0}) to ({u1}, {v1}) are {min} and ")?;
+                write!(f, "{max}, but must be finite, not negative and in this order")
+            }
+            Kind::ProceduralWeight { mesh, uv: [u, v], value, region: [[u0, v0], [u1, v1]], bounds: [min, max] } => {
+                write!(f, "mesh {mesh}: the weight at uv ({u}, {v}) is {value}, but its bounds over uv ")?;
+                write!(f, "({u0}, {v0}) to ({u1}, {v1}) are {min} and {max}")
             }
             Kind::UnknownTexture { mesh, texture, textures } => {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")

@@ -137,7 +137,7 @@ mod warp;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-pub use blas::Texture;
+pub use blas::{Procedural, Texture};
 pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSample, EnvironmentView, Sun, SunTexel};
 pub use error::Error;
 /// The vectors of the interface.

@@ -66,3 +66,27 @@ fn many_triangles_share_what_a_small_image_may_take() {
     let own = 2000 * (2 * 128 + 40);
     assert!(bytes < own + (1 << 18) + 4000, "{bytes}");
 }
+
+/// However often an image is repeated, a triangle takes no more than one copy of the image may, or one of 2^15 texels,
+/// and all together what the edges of one image may.
+#[test]
+fn tiling_takes_bounded_memory() {
+    for size in [16, 64, 256] {
+        let texels = ring(size);
+        let tiled = |copies: f32| {
+            let texture = Texture::new(size, size, &texels).expect("the image is finite");
+            let mut builder = LightSampler::builder();
+            let texture = builder.add_texture(texture);
+            let uvs = UVS.map(|uv| copies * uv - 0.5 * copies);
+            let positions = UVS.map(|uv| Vec3::new(uv.x, 0.0, uv.y));
+            let mesh = Mesh::portal(&positions, &[[0, 1, 2], [0, 2, 3]]).uvs(&uvs).weight(Weight::Texture(texture));
+            builder.add_mesh(&mesh).expect("the mesh is valid");
+            builder.build().expect("the lights are valid").as_view().bytes()[2]
+        };
+        let bytes = [1.0, 3.0, 10.0, 30.0, 100.0, 1000.0, 1e4, 1e5].map(tiled);
+        println!("{size}: {bytes:?}");
+        let most = (1 << 18) + 2 * (2 * (size * size).max(1 << 15) + 40);
+        assert!(bytes.iter().all(|&bytes| bytes <= most), "{bytes:?}");
+        assert!(bytes[3] > 10_000, "thirty copies can still be told apart: {bytes:?}");
+    }
+}

@@ -1,17 +1,18 @@
 //! Builds the BLAS of one triangle: how deep it goes and how much memory it may take.
 
 use alloc::vec::Vec;
+use core::convert::Infallible;
 
 use glam::Vec2;
 
 use crate::blas::barycentric::{Cell, LATTICE, MAX_DEPTH, level_halvings};
 use crate::blas::coverage::{average, storable};
 use crate::blas::footprint::{Chart, check_uv};
-use crate::blas::grow::{Limits, grow};
+use crate::blas::grow::{Limits, Source, Tree, grow};
 use crate::blas::node::{Block, CELLS, LEAF, Root, append, end};
 use crate::blas::pyramid::Prepared;
 use crate::blas::texture::Texture;
-use crate::blas::touched;
+use crate::blas::touched::{self, Range};
 use crate::error::{Error, Kind};
 use crate::record::{Filter, Wrap};
 
@@ -24,6 +25,12 @@ const FINE_LENGTH: f64 = 1.5;
 /// A fine cell may still be halved so often where its contrast is worth it: along sharp edges between texels, and
 /// where look-up blurs them.
 const EXTRA_HALVINGS: [u32; 2] = [6, 2];
+
+/// What the contrast of fine cells that are not divided may add to the relative variance.
+const VARIANCE: f64 = 0.003;
+
+/// The variance of a ramp, as a share of what two values at its ends would have.
+const RAMP: f64 = 1.0 / 3.0;
 
 /// Memory for each texel that a triangle covers. Where it covers copies of them, each texel counts for a quarter.
 const BYTES_PER_TEXEL: f64 = 2.0;
@@ -82,17 +89,49 @@ pub(crate) fn build<const M: usize>(
     let extra = if prepared.texture().filtering() == Filter::Nearest { sharp } else { blurred };
     let deepest = (fine + extra / level_halvings::<M>()).min(MAX_DEPTH / level_halvings::<M>());
     debug_assert!(LATTICE >> (deepest * level_halvings::<M>()) >= 16);
-    let tree = grow::<M>(prepared, &chart, range, &Limits { nodes, fine, deepest });
+    let source = ImageOn { prepared, chart: &chart };
+    let Ok(tree) = grow::<M, _>(&source, range, &Limits { nodes, fine, deepest, variance: VARIANCE });
+    let (root, bytes) = store(&tree, pool)?;
+    prepared.extra -= (bytes - memory.own).max(0.0).min(prepared.extra);
+    Ok(root)
+}
+
+/// Adds a tree to the pool. Second, the bytes that it takes.
+pub(super) fn store<const M: usize>(tree: &Tree, pool: &mut Vec<Block<M>>) -> Result<(Root, f64), Error> {
     if tree.divided.is_empty() || tree.average == 0.0 {
-        return Ok(Root::constant(tree.average));
+        return Ok((Root::constant(tree.average), 0.0));
     }
     let count = end(pool, tree.divided.len() / M);
     if count >= LEAF as usize {
         return Err(Error(Kind::TooMany { what: "BLAS nodes", count, limit: LEAF as usize }));
     }
     let bytes = tree.averages.len().div_ceil(CELLS) * size_of::<Block<M>>();
-    prepared.extra -= (bytes as f64 - memory.own).max(0.0).min(prepared.extra);
-    Ok(Root { average: tree.average, node: append(pool, &tree.averages, &tree.divided) })
+    Ok((Root { average: tree.average, node: append(pool, &tree.averages, &tree.divided) }, bytes as f64))
+}
+
+/// An image on a triangle.
+struct ImageOn<'a> {
+    prepared: &'a Prepared<'a>,
+    chart: &'a Chart,
+}
+
+impl Source for ImageOn<'_> {
+    type Fault = Infallible;
+
+    fn range(&self, cell: Cell, exact: bool) -> Result<Range, Infallible> {
+        Ok(touched::range(self.prepared, &self.chart.footprint(cell), exact))
+    }
+
+    fn average(&self, cell: Cell, range: Range) -> Result<f32, Infallible> {
+        Ok(average(self.prepared, &self.chart.footprint(cell), range))
+    }
+
+    fn spread(&self) -> f64 {
+        match self.prepared.texture().filtering() {
+            Filter::Nearest => 1.0,
+            Filter::Bilinear => RAMP,
+        }
+    }
 }
 
 /// How many levels it takes until cells are fine.

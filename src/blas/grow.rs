@@ -3,21 +3,27 @@
 use alloc::vec::Vec;
 
 use crate::blas::barycentric::Cell;
-use crate::blas::coverage::{average, storable};
-use crate::blas::footprint::Chart;
-use crate::blas::pyramid::Prepared;
-use crate::blas::touched::{self, Range};
-use crate::record::Filter;
-
-/// Fine cells are divided until what their contrast adds to the relative variance is below this.
-const VARIANCE: f64 = 0.003;
-
-/// The variance of a ramp, as a share of what two values at its ends would have.
-const RAMP: f64 = 1.0 / 3.0;
+use crate::blas::coverage::storable;
+use crate::blas::touched::Range;
 
 /// From this number of cells on, they are looked at in parallel.
 #[cfg(feature = "rayon")]
 const PARALLEL: usize = 256;
+
+/// The weights over a triangle.
+pub(crate) trait Source: Sync {
+    /// What may be wrong with them.
+    type Fault: Send;
+
+    /// Their ends over a cell. With `exact` false it is enough that a range which is not constant is found not to be.
+    fn range(&self, cell: Cell, exact: bool) -> Result<Range, Self::Fault>;
+
+    /// Their average over a cell of that range.
+    fn average(&self, cell: Cell, range: Range) -> Result<f32, Self::Fault>;
+
+    /// Their variance over a small cell, as a share of what two values at the ends of its range would have.
+    fn spread(&self) -> f64;
+}
 
 /// How far a tree may grow.
 pub(crate) struct Limits {
@@ -27,6 +33,9 @@ pub(crate) struct Limits {
     pub(crate) fine: u32,
     /// Cells of this level are not divided.
     pub(crate) deepest: u32,
+    /// Fine cells of a level are divided until what the contrast of the others adds to the relative variance is below
+    /// this.
+    pub(crate) variance: f64,
 }
 
 /// A tree before it is packed.
@@ -55,59 +64,48 @@ struct Measured {
 }
 
 /// Grows the tree of a triangle in which look-ups are not all the same. It has no nodes if that is not worth one.
-pub(crate) fn grow<const M: usize>(prepared: &Prepared<'_>, chart: &Chart, range: Range, limits: &Limits) -> Tree {
+pub(crate) fn grow<const M: usize, S: Source>(source: &S, range: Range, limits: &Limits) -> Result<Tree, S::Fault> {
     // The whole triangle stands in front, as the only cell of a node before the first.
-    let mut growing = Growing { prepared, chart, averages: alloc::vec![0.0], divided: alloc::vec![false], mass: 0.0 };
+    let mut growing = Growing { source, averages: alloc::vec![0.0], divided: alloc::vec![false], mass: 0.0 };
     let mut open = alloc::vec![Open { cell: Cell::root(), range, at: 0 }];
     let (mut nodes, mut level, mut share) = (0, 0, 1.0);
     while !open.is_empty() {
         let room = if level == limits.deepest { 0 } else { limits.nodes - nodes };
-        open = growing.choose(open, room, level >= limits.fine, share);
+        let spare = (level >= limits.fine).then_some(limits.variance);
+        open = growing.choose(open, room, spare, share)?;
         nodes += open.len();
         level += 1;
         share /= M as f64;
-        open = growing.divide::<M>(open, level >= limits.fine, share);
+        open = growing.divide::<M>(open, level >= limits.fine, share)?;
     }
-    growing.finish::<M>()
+    Ok(growing.finish::<M>())
 }
 
-struct Growing<'a> {
-    prepared: &'a Prepared<'a>,
-    chart: &'a Chart,
+struct Growing<'a, S> {
+    source: &'a S,
     averages: Vec<f32>,
     divided: Vec<bool>,
     /// The integral over all leaves so far, for a triangle of unit area.
     mass: f64,
 }
 
-impl Growing<'_> {
-    fn range(&self, cell: Cell, exact: bool) -> Range {
-        touched::range(self.prepared, &self.chart.footprint(cell), exact)
-    }
-
-    fn average(&self, cell: Cell, range: Range) -> f32 {
-        average(self.prepared, &self.chart.footprint(cell), range)
-    }
-
+impl<S: Source> Growing<'_, S> {
     /// The relative variance of sampling by averages is the sum of variance over mean. Ends of the range bound the
     /// variance (Bhatia and Davis 2000); with two values, and that is what edges have, the bound is exact.
-    fn measure(&self, open: &Open, is_exact: bool) -> Measured {
-        let range = if is_exact { open.range } else { self.range(open.cell, true) };
-        let average = self.average(open.cell, range);
+    fn measure(&self, open: &Open, is_exact: bool) -> Result<Measured, S::Fault> {
+        let range = if is_exact { open.range } else { self.source.range(open.cell, true)? };
+        let average = self.source.average(open.cell, range)?;
         let [min, max, mean] = [range.min, range.max, average].map(f64::from);
-        let spread = match self.prepared.texture().filtering() {
-            Filter::Nearest => 1.0,
-            Filter::Bilinear => RAMP,
-        };
-        Measured { average, variance: spread * (max - mean) * (mean - min) / mean }
+        Ok(Measured { average, variance: self.source.spread() * (max - mean) * (mean - min) / mean })
     }
 
-    /// The cells that are to be divided, in their order; the others become leaves.
-    fn choose(&mut self, open: Vec<Open>, room: usize, fine: bool, share: f64) -> Vec<Open> {
-        if !fine && open.len() <= room {
-            return open;
+    /// The cells that are to be divided, in their order; the others become leaves. Of fine cells those may stay that
+    /// together add no more than `spare` to the variance.
+    fn choose(&mut self, open: Vec<Open>, room: usize, spare: Option<f64>, share: f64) -> Result<Vec<Open>, S::Fault> {
+        if spare.is_none() && open.len() <= room {
+            return Ok(open);
         }
-        let measured = map(&open, |open| self.measure(open, fine));
+        let measured = map(&open, |open| self.measure(open, spare.is_some()))?;
         let mass = self.mass + share * measured.iter().map(|m| f64::from(m.average)).sum::<f64>();
         let mut ranks: Vec<(f64, usize)> = measured.iter().map(|m| m.variance).zip(0..).collect();
         ranks.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -115,7 +113,7 @@ impl Growing<'_> {
         let mut left = 0.0;
         let enough = |(variance, _): &&(f64, usize)| {
             left += share * variance;
-            fine && left <= VARIANCE * mass
+            spare.is_some_and(|spare| left <= spare * mass)
         };
         let spared = ranks.iter().rev().take_while(enough).count();
         let mut is_kept = alloc::vec![false; open.len()];
@@ -125,17 +123,19 @@ impl Growing<'_> {
         for ((open, measured), _) in open.iter().zip(&measured).zip(&is_kept).filter(|(_, is_kept)| !**is_kept) {
             self.set(open.at, measured.average, share);
         }
-        open.into_iter().zip(is_kept).filter_map(|(open, is_kept)| is_kept.then_some(open)).collect()
+        Ok(open.into_iter().zip(is_kept).filter_map(|(open, is_kept)| is_kept.then_some(open)).collect())
     }
 
     /// Adds the nodes below cells. Returns those of their cells over which look-ups differ.
-    fn divide<const M: usize>(&mut self, open: Vec<Open>, exact: bool, share: f64) -> Vec<Open> {
+    fn divide<const M: usize>(&mut self, open: Vec<Open>, exact: bool, share: f64) -> Result<Vec<Open>, S::Fault> {
         let children: Vec<[(Cell, Range); M]> = map(&open, |open| {
-            core::array::from_fn(|slot| {
-                let cell = open.cell.child::<M>(slot);
-                (cell, self.range(cell, exact))
-            })
-        });
+            let mut children = [(open.cell, open.range); M];
+            for (slot, (cell, range)) in children.iter_mut().enumerate() {
+                *cell = open.cell.child::<M>(slot);
+                *range = self.source.range(*cell, exact)?;
+            }
+            Ok(children)
+        })?;
         let mut next = Vec::new();
         for (parent, children) in open.iter().zip(children) {
             self.divided[parent.at] = true;
@@ -150,7 +150,7 @@ impl Growing<'_> {
                 }
             }
         }
-        next
+        Ok(next)
     }
 
     fn set(&mut self, at: usize, average: f32, share: f64) {
@@ -175,12 +175,13 @@ impl Growing<'_> {
 }
 
 /// Maps all items, in parallel with the feature `rayon`. Each one is mapped alone, and the order stays: the result does
-/// not depend on the number of threads.
-fn map<T: Sync, R: Send>(items: &[T], map: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+/// not depend on the number of threads, and what fails first in this order is the fault that is returned.
+fn map<T: Sync, R: Send, F: Send>(items: &[T], map: impl Fn(&T) -> Result<R, F> + Sync + Send) -> Result<Vec<R>, F> {
     #[cfg(feature = "rayon")]
     if items.len() >= PARALLEL {
         use rayon::prelude::*;
-        return items.par_iter().map(map).collect();
+        let mapped: Vec<Result<R, F>> = items.par_iter().map(map).collect();
+        return mapped.into_iter().collect();
     }
     items.iter().map(map).collect()
 }

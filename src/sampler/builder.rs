@@ -8,12 +8,19 @@ use core::ops::ControlFlow;
 use super::energy::{Energies, Scales};
 use super::lights::{LightSampler, NO_AREA, NO_LEAF};
 use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
-use crate::blas::{self, Prepared, Root, Texture};
+use crate::blas::{self, Function, Prepared, Procedural, Root, Texture};
 use crate::env::Environment;
 use crate::error::{Error, Kind as ErrorKind};
 use crate::light::{Illumination, LightTriangle};
 use crate::parallel;
 use crate::tlas::{self, MAX_LEAVES, Report};
+
+/// What a textured weight is read from.
+#[derive(Debug)]
+enum Surface<'a> {
+    Image(Prepared<'a>),
+    Function(Function<'a>),
+}
 
 /// Collects the lights of a scene and builds a [`LightSampler`].
 ///
@@ -23,7 +30,7 @@ use crate::tlas::{self, MAX_LEAVES, Report};
 pub struct LightSamplerBuilder<'a, const N: usize = 8, const M: usize = 4> {
     environment: Option<Environment>,
     illumination: Illumination,
-    textures: Vec<Prepared<'a>>,
+    textures: Vec<Surface<'a>>,
     /// Triangles that may send light.
     triangles: Vec<LightTriangle>,
     /// For every triangle that was added, its place in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
@@ -71,7 +78,14 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
 
     /// Adds a texture that meshes can refer to. Its texels are needed until [`Self::build`].
     pub fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
-        self.textures.push(Prepared::new(texture));
+        self.textures.push(Surface::Image(Prepared::new(texture)));
+        TextureId(self.textures.len() - 1)
+    }
+
+    /// Adds a function of texture coordinates that meshes can refer to like a texture. It is asked by
+    /// [`Self::add_mesh`].
+    pub fn add_procedural(&mut self, function: &'a dyn Procedural) -> TextureId {
+        self.textures.push(Surface::Function(Function::new(function)));
         TextureId(self.textures.len() - 1)
     }
 
@@ -81,13 +95,18 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// # Errors
     ///
     /// If a vertex is not finite or has a coordinate above 1e9, an index has no vertex, the weight is NaN, negative
-    /// or above 1e30, or it is a texture of another builder or one without as many uvs as vertices.
+    /// or above 1e30, or it is a texture of another builder or one without as many uvs as vertices; if the bounds of a
+    /// [`Procedural`] are not finite, negative or in the wrong order, or its weight is not within them.
     pub fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<u32, Error> {
         let number = self.meshes.len() - 1;
         self.check(number, mesh)?;
         let before = (self.triangles.len(), self.places.len(), self.cells.len());
+        let function = self.function(mesh).copied();
         for indices in mesh.indices {
             if let Err(error) = self.add_triangle(mesh, *indices) {
+                if let (Some(changed), Some(before)) = (self.function(mesh), function) {
+                    *changed = before;
+                }
                 self.triangles.truncate(before.0);
                 self.places.truncate(before.1);
                 self.cells.truncate(before.2);
@@ -207,6 +226,15 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         Ok(())
     }
 
+    /// What guides the mesh, if that is a function.
+    fn function(&mut self, mesh: &Mesh<'_>) -> Option<&mut Function<'a>> {
+        let Weight::Texture(TextureId(texture)) = mesh.weight else { return None };
+        match &mut self.textures[texture] {
+            Surface::Function(function) => Some(function),
+            Surface::Image(_) => None,
+        }
+    }
+
     /// The tree over the texture of one triangle, built only if no triangle before has the same.
     fn root(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<Root, Error> {
         let texture = match mesh.weight {
@@ -219,7 +247,11 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         if let Some(&root) = self.shared.get(&key) {
             return Ok(root);
         }
-        let root = blas::build(&mut self.textures[texture], uvs, &mut self.cells)?;
+        let mesh = self.meshes.len() - 1;
+        let root = match &mut self.textures[texture] {
+            Surface::Image(image) => blas::build(image, uvs, &mut self.cells),
+            Surface::Function(function) => blas::build_procedural(function, mesh, uvs, &mut self.cells),
+        }?;
         self.shared.insert(key, root);
         Ok(root)
     }
