@@ -77,16 +77,17 @@ pub(crate) fn child<const M: usize>(local: [u32; 3], size: u32) -> (usize, [u32;
     let shift = size.trailing_zeros() - level_halvings::<M>();
     let t = 1 << shift;
     let [j0, j1, j2] = local;
-    let mut a1 = (j1 >> shift).min(r - 1);
+    let mut a1 = j1 >> shift;
     let a2 = (j2 >> shift).min(r - 1);
-    // Only at an inner corner of the edge across from vertex 0, where b1 and b2 are whole cells: it becomes the
-    // second corner of the cell before it.
+    // Only at vertex 1 and at inner corners of the edge across from vertex 0, where b1 and b2 are whole cells: the
+    // point becomes the second corner of the cell before it.
     if a1 + a2 == r {
         a1 -= 1;
     }
     let (f1, f2) = (j1 - (a1 << shift), j2 - (a2 << shift));
-    // β0 is the row; the place in the row is β1 - β2 + β0 = 2 a2, plus one in an inverted cell.
-    if f1 + f2 <= t || a1 + a2 == r - 1 {
+    // β0 is the row; the place in the row is β1 - β2 + β0 = 2 a2, plus one in an inverted cell. No inverted cell
+    // begins in the last row: f1 + f2 is at most t there.
+    if f1 + f2 <= t {
         let row = a1 + a2;
         let a0 = r - 1 - row;
         ((row * row + 2 * a2) as usize, [j0 - (a0 << shift), f1, f2])
