@@ -159,3 +159,27 @@ fn interior_points_are_uniform() {
         assert!((4.0 * f64::from(q) / count - 1.0).abs() < 2e-3, "{quarters:?}");
     }
 }
+
+#[test]
+fn cells_hold_the_points_strictly_inside() {
+    let parent = Cell { offset: [0; 3], inverted: false, size: 32 };
+    for index in 0..16 {
+        let cell = parent.child::<16>(index);
+        let mut held = 0;
+        for j1 in 0..=32 {
+            for j2 in 0..=32 - j1 {
+                let point = Lattice([32 - j1 - j2, j1, j2]);
+                let local = cell.local(point);
+                let is_inside = local.iter().all(|&j| j > 0);
+                assert_eq!(cell.holds(point), is_inside);
+                assert_eq!(local.iter().sum::<i32>(), 8);
+                if is_inside {
+                    held += 1;
+                    assert_eq!(cell.global(local.map(|j| j as u32)), point);
+                    assert_eq!(child::<16>(point.0, 32).0, index);
+                }
+            }
+        }
+        assert_eq!(held, 7 * 6 / 2);
+    }
+}
