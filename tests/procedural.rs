@@ -105,9 +105,9 @@ fn examine(lights: &dyn Lights, scene: &Scene, x: &ShadingPoint, least_depth: u3
         factor * f64::from(lights.pdf(x, hit))
     };
     let mut expected = Vec::new();
-    for triangle in 0..2 {
+    for (triangle, probes) in probes[0].iter().enumerate() {
         let on = OnTriangle::new(scene, (0, triangle), x, &pdf);
-        expected.extend(on.integrate(DEPTH, least_depth, &probes[0][triangle]).0);
+        expected.extend(on.integrate(DEPTH, least_depth, probes).0);
     }
     let integral = expected.iter().sum::<f64>();
     expected.iter_mut().for_each(|share| *share *= SAMPLES as f64);
