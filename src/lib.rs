@@ -34,7 +34,7 @@
 //!
 //! # How to use it
 //!
-//! 1. Make a [`LightSampler::builder`], give it the [`Environment`], the [`Texture`]s and the [`Mesh`]es, and
+//! 1. Make a [`LightSampler::builder`], give it the [`Environment`], the [`Texture`]s or [`Procedural`]s and the [`Mesh`]es, and
 //!    build. Everything is checked here: what a builder accepted can always be sampled.
 //! 2. At a [`ShadingPoint`], call [`sample`](LightSampler::sample) with three random numbers and trace a ray. `None`
 //!    is a sample of zero.

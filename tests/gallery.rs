@@ -7,7 +7,7 @@ mod render;
 #[path = "../examples/gallery/scenes/mod.rs"]
 mod scenes;
 
-use render::{Budget, PathTracer, Progressive, Techniques, World};
+use render::{Budget, LightChoice, PathTracer, Progressive, Published, Techniques, World};
 
 /// Pixels of the pictures.
 const SIZE: [u32; 2] = [32, 24];
@@ -26,11 +26,16 @@ fn mean(world: &World, model: &render::Model, techniques: &Techniques, bounces: 
 
 /// Compares the means of a scene, of which each must be known to such a share.
 fn check(name: &str, bounces: u32, samples: [u32; 2], share: f64) {
+    compare(name, bounces, samples, share, |model| Techniques::without(model).expect("lights"));
+}
+
+/// The same with techniques that the others are compared with.
+fn compare(name: &str, bounces: u32, samples: [u32; 2], share: f64, techniques: impl Fn(&render::Model) -> Techniques) {
     let scene = scenes::ALL.iter().find(|scene| scene.name == name).expect("a scene");
     let mut model = (scene.model)();
     model.camera = model.camera.sized(SIZE);
     let world = World::new(&model);
-    let without = Techniques::without(&model).expect("lights");
+    let without = techniques(&model);
     let with = Techniques::with(&model).expect("lights");
     let [a, a_variance] = mean(&world, &model, &without, bounces, samples[0]);
     let [b, b_variance] = mean(&world, &model, &with, bounces, samples[1]);
@@ -67,4 +72,13 @@ fn neon() {
 #[test]
 fn fog() {
     check("fog", 3, [400, 40], 0.03);
+}
+
+/// What the default is compared with is right, too.
+#[test]
+fn neon_as_published() {
+    compare("neon", 1, [200, 100], 0.02, |model| {
+        let techniques = Techniques::without(model).expect("lights");
+        techniques.choosing(LightChoice::Published(Published::new(model)))
+    });
 }

@@ -9,6 +9,8 @@ mod gltf;
 mod render;
 mod report;
 mod scenes;
+#[path = "../room/start.rs"]
+mod start;
 mod studies;
 
 use std::path::{Path, PathBuf};
@@ -24,21 +26,7 @@ use scenes::Scene;
 const FOLDER: &str = "docs/gallery";
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse() {
-        Ok(Some(arguments)) => run(&arguments),
-        Ok(None) => {
-            print!("{}", arguments::HELP);
-            Ok(())
-        }
-        Err(error) => Err(format!("{error} (--help lists the options)").into()),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    start::start(Arguments::parse(), arguments::HELP, run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Error> {

@@ -6,6 +6,7 @@
 mod arguments;
 mod picture;
 mod render;
+mod start;
 mod table;
 
 use std::process::ExitCode;
@@ -24,21 +25,7 @@ const REFERENCE_FACTOR: u32 = 4;
 const DEFAULT_SCALE: u32 = 3;
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse() {
-        Ok(Some(arguments)) => run(&arguments),
-        Ok(None) => {
-            print!("{}", arguments::HELP);
-            Ok(())
-        }
-        Err(error) => Err(format!("{error} (--help lists the options)").into()),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    start::start(Arguments::parse(), arguments::HELP, run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Error> {

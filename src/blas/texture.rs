@@ -12,6 +12,10 @@ pub(crate) const MAX_SIDE: usize = 1 << 15;
 /// Texel `(i, j)`, at `texels[j * width + i]`, covers `u` in `[i / width, (i + 1) / width)` and `v` in
 /// `[j / height, (j + 1) / height)`. Filter and wrap say how the host looks the image up, so that no place where the
 /// host sees light is left without a chance of being sampled.
+///
+/// Texture coordinates outside of `[0, 1]` repeat the image if it wraps so. The trees over it do not grow with the number
+/// of copies: a triangle takes no more than 64 kB, or half a byte a texel if that is more, besides the 256 kB that all
+/// triangles of a small image share. For a weight without an image see [`Procedural`](crate::Procedural).
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     width: u32,

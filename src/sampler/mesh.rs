@@ -24,7 +24,7 @@ pub enum Sides {
 pub enum Weight {
     /// The same everywhere; finite, not negative.
     Constant(f32),
-    /// A texture, seen through the mesh's texture coordinates.
+    /// A texture or a [`Procedural`](crate::Procedural), seen through the mesh's texture coordinates.
     Texture(TextureId),
 }
 

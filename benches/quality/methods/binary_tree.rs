@@ -5,8 +5,6 @@ use ::fanlight::ShadingPoint;
 use glam::Vec3;
 
 use super::light_bounds::LightBounds;
-use super::power::flux;
-use crate::scenes::Scene;
 
 const BUCKETS: usize = 12;
 const LEAF: u32 = 1 << 31;
@@ -21,16 +19,6 @@ pub(crate) struct BinaryTree {
     nodes: Vec<Node>,
     /// Way to each light, the first step in the lowest bit.
     trails: Vec<u64>,
-}
-
-/// Bounds of the lights of a scene.
-pub(crate) fn scene_bounds(scene: &Scene) -> Vec<LightBounds> {
-    let bounds = |l: usize| {
-        let light = &scene.lights[l];
-        let (normal, _) = light.normal_and_area();
-        LightBounds::of_triangle(light.vertices.map(|v| v.as_vec3()), normal.as_vec3(), flux(scene, l) as f32)
-    };
-    (0..scene.lights.len()).map(bounds).collect()
 }
 
 impl BinaryTree {

@@ -2,8 +2,8 @@
 
 use ::fanlight::ShadingPoint;
 
-use super::binary_tree::scene_bounds;
 use super::light_bounds::LightBounds;
+use super::power::scene_bounds;
 use crate::scenes::Scene;
 
 pub(crate) struct EveryLight {

@@ -139,7 +139,7 @@ pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
         }
         "uniform-area" => Box::new(ThenPoint::new(scene, triangle::best_choice(scene), OnTriangle::Area)),
         "talk-tree" => {
-            let binary = binary_tree::BinaryTree::new(&binary_tree::scene_bounds(scene));
+            let binary = binary_tree::BinaryTree::new(&power::scene_bounds(scene));
             let choice = Choice::Wide(wide_tree::WideTree::new(&binary));
             Box::new(ThenPoint::new(scene, choice, OnTriangle::SolidAngle))
         }

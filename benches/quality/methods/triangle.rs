@@ -4,9 +4,9 @@ use ::fanlight::ShadingPoint;
 use glam::DVec3;
 
 use super::arvo::{SphericalTriangle, barycentrics, crosses};
-use super::binary_tree::{BinaryTree, scene_bounds};
+use super::binary_tree::BinaryTree;
 use super::every_light::EveryLight;
-use super::power::Power;
+use super::power::{Power, scene_bounds};
 use super::wide_tree::WideTree;
 use super::{Drawn, Method};
 use crate::oracle::lambert::solid_angle;

@@ -1,6 +1,6 @@
 //! A small path tracer for triangle meshes.
 //!
-//! What it shares with [`lighting`], the only file that calls `fanlight` for it, is what any renderer has: a scene to
+//! What it shares with [`lighting`] and [`weights`], the only files that call `fanlight` for it, is what any renderer has: a scene to
 //! cast rays into ([`scene`]), materials ([`material`], [`bsdf`]), the radiance of the sky ([`world`]), and an
 //! integrator that asks for directions and for densities of directions ([`path`], and [`photon`] for light that is
 //! traced from its source).
@@ -24,12 +24,15 @@ mod path;
 mod photon;
 #[path = "../../room/render/progressive.rs"]
 mod progressive;
+mod published;
 mod random;
 mod scene;
 #[path = "../../room/render/sky.rs"]
 mod sky;
 mod technique;
 mod texel_table;
+mod vertex;
+mod weights;
 mod world;
 
 pub(crate) use bitmap::{Bitmap, encode_srgb};
@@ -43,6 +46,7 @@ pub(crate) use mesh::Mesh;
 pub(crate) use model::{Fog, Model};
 pub(crate) use path::PathTracer;
 pub(crate) use progressive::{Budget, Progressive};
+pub(crate) use published::Published;
 pub(crate) use random::Random;
 pub(crate) use scene::Point;
 pub(crate) use sky::{LUMINANCE, Sky, direction_of};

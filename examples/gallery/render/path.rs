@@ -1,16 +1,14 @@
 //! The integrator: paths with direct light at each vertex. All techniques that find the same light are weighted by the
 //! balance heuristic (Veach and Guibas 1995): with one sample of each, that is what arrives over the sum of densities.
 
-use core::f32::consts::PI;
-
 use glam::Vec3;
 
-use super::bsdf::Bsdf;
-use super::lighting::{LightsAt, Proposal};
+use super::lighting::Proposal;
 use super::photon::{Photon, PhotonTracer};
 pub(crate) use super::random::Random;
 use super::scene::Point;
 use super::technique::{ChoiceAt, Techniques};
+use super::vertex::{Place, Vertex};
 use super::world::World;
 
 /// How many offsets of rays apart two points may be that are the same one.
@@ -24,23 +22,6 @@ pub(crate) struct PathTracer<'a> {
     bounces: u32,
     /// Traces light in the other direction, where that is of use.
     photons: Option<PhotonTracer<'a>>,
-}
-
-/// A point of a path, and how light is sampled there.
-struct Vertex<'a> {
-    place: Place,
-    lights: ChoiceAt<'a>,
-    guide: Option<LightsAt<'a>>,
-    /// Density per area with which the path came here from the vertex before, if the end of a light ray could have
-    /// stood in its place.
-    arrival: Option<f32>,
-}
-
-/// What light is scattered by.
-enum Place {
-    Surface(Point, Bsdf),
-    /// Evenly in all directions.
-    Fog(Vec3),
 }
 
 impl<'a> PathTracer<'a> {
@@ -202,55 +183,5 @@ impl<'a> PathTracer<'a> {
             _ => 0.0,
         };
         x.pdf(direction) + environment_pdf + lights_pdf + photon_pdf
-    }
-}
-
-impl Vertex<'_> {
-    fn position(&self) -> Vec3 {
-        match &self.place {
-            Place::Surface(point, _) => point.position,
-            Place::Fog(position) => *position,
-        }
-    }
-
-    /// Where a ray starts that leaves in a direction.
-    fn start(&self, direction: Vec3) -> Vec3 {
-        match &self.place {
-            Place::Surface(point, _) => point.start(direction),
-            Place::Fog(position) => *position,
-        }
-    }
-
-    /// Share of the radiance from a direction that is scattered, per solid angle.
-    fn value(&self, direction: Vec3) -> Vec3 {
-        match &self.place {
-            Place::Surface(_, bsdf) => bsdf.value(direction),
-            Place::Fog(_) => Vec3::splat(0.25 / PI),
-        }
-    }
-
-    /// A direction in which the path goes on, and the share of the radiance from there.
-    fn scatter(&self, random: &mut Random) -> Option<(Vec3, Vec3)> {
-        let [choice, rest @ ..]: [f32; 4] = random.take();
-        let direction = match (&self.guide, &self.place) {
-            (Some(guide), _) if choice < 0.5 => guide.sample(rest)?.direction,
-            (_, Place::Surface(_, bsdf)) => bsdf.sample(rest),
-            (_, Place::Fog(_)) => {
-                let height = 1.0 - 2.0 * rest[0];
-                let disc = (1.0 - height * height).sqrt() * glam::Vec2::from_angle(2.0 * PI * rest[1]);
-                disc.extend(height)
-            }
-        };
-        let value = self.value(direction);
-        (value != Vec3::ZERO).then_some((direction, value))
-    }
-
-    /// Density per solid angle of [`scatter`](Self::scatter)'s directions.
-    fn pdf(&self, direction: Vec3) -> f32 {
-        let own = match &self.place {
-            Place::Surface(_, bsdf) => bsdf.pdf(direction),
-            Place::Fog(_) => 0.25 / PI,
-        };
-        self.guide.as_ref().map_or(own, |guide| 0.5 * (own + guide.pdf(direction)))
     }
 }

@@ -1,9 +1,12 @@
 //! The ways in which directions to light are found, next to the scattering of the surface itself.
 
+use fanlight::ShadingPoint;
+
 use super::Error;
 use super::bsdf::Bsdf;
 use super::lighting::{Guide, Illumination, Lights, LightsAt, Proposal};
 use super::model::Model;
+use super::published::Published;
 use super::scene::Point;
 use super::texel_table::TexelTable;
 
@@ -18,6 +21,8 @@ pub(crate) enum LightChoice {
     Single,
     /// From one table for the whole scene, emitters only.
     Table(TexelTable),
+    /// As it was published, emitters only.
+    Published(Published),
 }
 
 /// The lights of a scene, and which techniques are used to find them.
@@ -66,6 +71,9 @@ impl Techniques {
             }
             LightChoice::Single => ChoiceAt::Single(self.lights.at_surface(point.position, bsdf)),
             LightChoice::Table(table) => ChoiceAt::Table(table, point.position),
+            LightChoice::Published(lights) => {
+                ChoiceAt::Published(lights, ShadingPoint::surface(point.position, bsdf.normal()))
+            }
             _ => ChoiceAt::None,
         }
     }
@@ -91,6 +99,7 @@ pub(crate) enum ChoiceAt<'a> {
     Fanlight(LightsAt<'a>),
     Single(LightsAt<'a>),
     Table(&'a TexelTable, glam::Vec3),
+    Published(&'a Published, ShadingPoint),
 }
 
 impl ChoiceAt<'_> {
@@ -101,6 +110,7 @@ impl ChoiceAt<'_> {
             Self::Fanlight(lights) => lights.sample(u),
             Self::Single(lights) => lights.sample_single(u),
             Self::Table(table, position) => table.sample(*position, u),
+            Self::Published(lights, x) => lights.sample(x, u),
         }
     }
 
@@ -111,6 +121,7 @@ impl ChoiceAt<'_> {
             Self::None | Self::Single(_) => 0.0,
             Self::Fanlight(lights) => lights.pdf(direction),
             Self::Table(table, _) => from.map_or(0.0, |point| table.pdf(direction, point)),
+            Self::Published(lights, x) => from.map_or(0.0, |point| lights.pdf(x, direction, point)),
         }
     }
 }

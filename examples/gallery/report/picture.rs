@@ -15,8 +15,8 @@ const GAP: u32 = 4;
 /// Size and enlargement of the details.
 const DETAIL: (u32, u32) = (44, 33);
 const ENLARGED: u32 = 3;
-/// Size of one image on the contact sheet.
-const TILE: (u32, u32) = (160, 120);
+/// Size of one image on the contact sheet: half of what is rendered.
+const TILE: (u32, u32) = (104, 78);
 
 /// Images of one scene in the same exposure.
 pub(crate) struct Picture {

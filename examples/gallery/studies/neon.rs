@@ -1,7 +1,9 @@
 //! Ways to choose points of a textured mesh light, in equal time and with equal samples.
 
 use super::contestant;
-use crate::render::{Budget, Error, Illumination, LightChoice, Lights, Model, Techniques, TexelTable, World};
+use crate::render::{
+    Budget, Error, Illumination, LightChoice, Lights, Model, Published, Techniques, TexelTable, World,
+};
 use crate::report::{Comparison, Effort, compare};
 
 /// Samples a pixel where these are the same for all.
@@ -18,7 +20,11 @@ pub(super) fn study(model: &Model, effort: Effort) -> Result<Comparison, Error> 
             Techniques::without(model)?.choosing(LightChoice::Table(TexelTable::texels(model))),
         ),
         contestant("boundary integration", with(Illumination::Boundary)?),
-        contestant("conservative (published)", with(Illumination::Conservative)?),
+        contestant(
+            "published method",
+            Techniques::without(model)?.choosing(LightChoice::Published(Published::new(model))),
+        ),
+        contestant("conservative term alone", with(Illumination::Conservative)?),
         contestant("clamped vertices (default)", with(Illumination::default())?),
     ];
     let world = World::new(model);

@@ -12,8 +12,9 @@ use ::fanlight::{Receiver, ShadingPoint};
 use glam::{DVec3, Vec3};
 
 use super::arvo::{barycentrics, crosses};
-use super::binary_tree::{BinaryTree, scene_bounds};
+use super::binary_tree::BinaryTree;
 use super::light_bounds::LightBounds;
+use super::power::scene_bounds;
 use super::triangle::{area_density, front, uniform};
 use super::wide_tree::{WideTree, pick};
 use super::{Drawn, Method};
