@@ -27,7 +27,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     pub(super) fn tree_count(&self, leaf: u32, splitting: Option<&Splitting>) -> f64 {
         let scene = self.lights.scene(&self.x);
         match splitting {
-            None => self.lights.tlas.pmf(leaf, &self.x, &scene),
+            None => self.lights.tlas.pmf(leaf, &self.x, &scene, self.first_weights.as_ref()),
             Some(splitting) => self.lights.tlas.expected_count(leaf, &self.x, &scene, splitting),
         }
     }

@@ -19,7 +19,8 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
         match self.techniques.choose(&mut choice) {
             Technique::Sun(sun) => self.sample_sun(sun, point, None),
             Technique::Trees => {
-                let (leaf, pmf) = self.lights.tlas.sample(&self.x, &self.lights.scene(&self.x), choice)?;
+                let scene = self.lights.scene(&self.x);
+                let (leaf, pmf) = self.lights.tlas.sample(&self.x, &scene, self.first_weights.as_ref(), choice)?;
                 self.sample_on(leaf, pmf, point)
             }
         }

@@ -35,8 +35,13 @@ impl<S: Scene> Walk<S> {
     #[inline(always)]
     fn step<const N: usize>(&mut self, tlas: &TlasView<'_, N>) {
         let node = &tlas.nodes[self.node as usize];
-        let weights = node.weights(&self.sight, &self.scene);
-        let Some((lane, share)) = pick_wide(&weights, &mut self.u) else {
+        self.choose(node, &node.weights(&self.sight, &self.scene));
+    }
+
+    /// Chooses a child by the weights of all.
+    #[inline(always)]
+    fn choose<const N: usize>(&mut self, node: &Node<N>, weights: &[f32; N]) {
+        let Some((lane, share)) = pick_wide(weights, &mut self.u) else {
             self.end = Some(None);
             return;
         };
@@ -98,6 +103,8 @@ pub(super) struct Follow<'a, const N: usize, S> {
     pub(super) leaf: u32,
     pub(super) x: &'a ShadingPoint,
     pub(super) scene: &'a S,
+    /// Weights of the root, if they are known.
+    pub(super) first: Option<&'a [f32; N]>,
 }
 
 impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
@@ -111,7 +118,10 @@ impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
         let mut pmf = 1.0;
         // Not a fold, whose closure would be compiled for the baseline.
         for (node, lane) in self.tlas.path(self.leaf) {
-            pmf *= pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane);
+            pmf *= match self.first {
+                Some(weights) if node == 0 => pmf_wide(weights, lane),
+                _ => pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane),
+            };
         }
         pmf
     }
@@ -142,12 +152,20 @@ impl<const N: usize> Node<N> {
 
 impl<const N: usize> TlasView<'_, N> {
     /// Draws a leaf. Returns it with its probability; `None` where nothing can arrive from the part of the tree
-    /// that `u` leads to.
-    pub(crate) fn sample(&self, x: &ShadingPoint, scene: &impl Scene, u: Variate) -> Option<(u32, f64)> {
-        if self.nodes.is_empty() {
-            return self.single_leaf(scene).then_some((0, 1.0));
+    /// that `u` leads to. `first` are [`Self::first_weights`], if they are known.
+    pub(crate) fn sample(
+        &self,
+        x: &ShadingPoint,
+        scene: &impl Scene,
+        first: Option<&[f32; N]>,
+        u: Variate,
+    ) -> Option<(u32, f64)> {
+        let Some(root) = self.nodes.first() else { return self.single_leaf(scene).then_some((0, 1.0)) };
+        let mut walk = Walk::new(x, scene, u);
+        if let Some(weights) = first {
+            walk.choose(root, weights);
         }
-        self.sample_below(0, x, scene, u)
+        Level::best().run(Draw { tlas: self, walk })
     }
 
     /// Draws a leaf below a node.
@@ -174,17 +192,17 @@ impl<const N: usize> TlasView<'_, N> {
     }
 
     /// Probability with which [`Self::sample`] draws a leaf.
-    pub(crate) fn pmf(&self, leaf: u32, x: &ShadingPoint, scene: &impl Scene) -> f64 {
+    pub(crate) fn pmf(&self, leaf: u32, x: &ShadingPoint, scene: &impl Scene, first: Option<&[f32; N]>) -> f64 {
         if self.nodes.is_empty() {
             return if self.single_leaf(scene) { 1.0 } else { 0.0 };
         }
-        Level::best().run(Follow { tlas: self, leaf, x, scene })
+        Level::best().run(Follow { tlas: self, leaf, x, scene, first })
     }
 
-    /// Estimate of the irradiance from all leaves, in units of the sum of their energies. Zero for a tree without
-    /// nodes.
-    pub(crate) fn irradiance(&self, x: &ShadingPoint, scene: &impl Scene) -> f32 {
-        self.nodes.first().map_or(0.0, |root| root.weigh(x, scene).iter().sum())
+    /// Weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
+    /// energies; `None` for a tree without nodes.
+    pub(crate) fn first_weights(&self, x: &ShadingPoint, scene: &impl Scene) -> Option<[f32; N]> {
+        self.nodes.first().map(|root| root.weigh(x, scene))
     }
 
     /// Nodes and lanes on the way from a leaf to the root.

@@ -197,7 +197,7 @@ impl<const N: usize> Node<N> {
             largest = largest.max(weights[i].to_bits());
             doubtful |= u32::from((straddles | (facing < EDGE * distance)) & !culled) << i;
         }
-        let leaves = (1u32 << self.width).wrapping_sub(1 << self.node_count);
+        let leaves = self.children() & (u32::MAX << self.node_count);
         Estimates { weights, largest, doubtful: doubtful & leaves }
     }
 }
