@@ -11,6 +11,7 @@ pub(crate) struct Triangle(pub(crate) [Vec3; 3]);
 impl Triangle {
     /// Cross product of two edges: normal of the front side times twice the area. In double precision, where the
     /// differences of coordinates of like size are exact, so that slivers keep their direction.
+    #[inline]
     pub(crate) fn double_area_vector(&self) -> DVec3 {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
         (b - a).cross(c - a)
@@ -30,11 +31,13 @@ impl Triangle {
     }
 
     /// The vertices relative to a point, in double precision.
+    #[inline]
     pub(crate) fn exactly_relative_to(&self, point: Vec3) -> [DVec3; 3] {
         self.0.map(|vertex| vertex.as_dvec3() - point.as_dvec3())
     }
 
     /// The vertices relative to a point.
+    #[inline]
     pub(crate) fn relative_to(&self, point: Vec3) -> [Vec3; 3] {
         self.0.map(|vertex| vertex - point)
     }

@@ -36,6 +36,7 @@ impl LightTriangle {
     /// Shows the environment behind it.
     pub(crate) const PORTAL: u32 = 1 << 30;
 
+    #[inline]
     pub(crate) fn triangle(&self) -> Triangle {
         Triangle(self.vertices.map(Vec3::from))
     }

@@ -35,8 +35,8 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
             let triangle = self.lights.triangles[leaf as usize].triangle();
             let vertices = triangle.exactly_relative_to(self.x.position);
             let Some(hit) = geometry::intersect(vertices, direction) else { return };
-            if let Some(lit) = self.lights.lit(leaf, &self.x) {
-                density += self.density(leaf, Lattice::from_barycentrics(hit), &lit, splitting);
+            if let Some(lit) = &self.lights.lit(leaf, &self.x) {
+                density += self.density(leaf, Lattice::from_barycentrics(hit), lit, splitting);
             }
         });
         density

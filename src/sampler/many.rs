@@ -8,10 +8,8 @@ use super::lights::{LightSampler, LightSamplerView, Scene};
 use super::sample::variates;
 use crate::record::{LightSample, ShadingPoint};
 use crate::simd::prefetch;
-use crate::tlas::Walk;
-
-/// Walks down the tree that take turns: enough to hide what one waits for, few enough to stay in the cache.
-const TURNS: usize = 8;
+use crate::tlas::{TURNS, Walk};
+use crate::warp::Variate;
 
 impl<const N: usize, const M: usize> LightSampler<N, M> {
     /// See [`LightSamplerView::sample_many`].
@@ -39,17 +37,19 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
 
     fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
         let mut walks = SmallVec::<[Walk<Scene<'_>>; TURNS]>::new();
+        let mut points = SmallVec::<[[Variate; 2]; TURNS]>::new();
         for (x, u) in queries {
-            let [choice, ..] = variates(*u);
+            let [choice, point @ ..] = variates(*u);
             walks.push(Walk::new(x, self.scene(x), choice));
+            points.push(point);
         }
         self.tlas.sample_many(&mut walks);
         for (leaf, _) in walks.iter().filter_map(Walk::leaf) {
             prefetch(&self.triangles[leaf as usize]);
         }
-        for ((walk, (x, u)), sample) in walks.iter().zip(queries).zip(samples) {
-            let [_, point @ ..] = variates(*u);
-            *sample = walk.leaf().and_then(|(leaf, pmf)| self.at(x).sample_on(leaf, pmf, point));
+        for (i, sample) in samples.iter_mut().enumerate().take(walks.len()) {
+            let on = |(leaf, pmf)| self.at(&queries[i].0).sample_on(leaf, pmf, points[i]);
+            *sample = walks[i].leaf().and_then(on);
         }
     }
 }

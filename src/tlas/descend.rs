@@ -6,6 +6,9 @@ use crate::record::ShadingPoint;
 use crate::simd::{Level, Work, prefetch};
 use crate::warp::{Variate, pick_wide, pmf_wide};
 
+/// Walks that take turns: enough to hide what one waits for, few enough to stay in the cache.
+pub(crate) const TURNS: usize = 8;
+
 /// A way down the tree, as far as it has got.
 pub(crate) struct Walk<S> {
     sight: Sight,
@@ -72,7 +75,8 @@ impl<const N: usize, S: Scene> Work for Draw<'_, N, S> {
     }
 }
 
-/// Several ways down, one step each in turn: while one waits for memory and for sums, the others go on.
+/// Several ways down, one step each in turn, and each step in two halves: while one way waits for memory or for sums,
+/// the others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
 struct DrawMany<'a, const N: usize, S> {
     tlas: &'a TlasView<'a, N>,
     walks: &'a mut [Walk<S>],
@@ -83,12 +87,16 @@ impl<const N: usize, S: Scene> Work for DrawMany<'_, N, S> {
 
     #[inline(always)]
     fn run(self) {
-        let mut going = true;
-        while going {
-            going = false;
-            for walk in &mut *self.walks {
-                if walk.end.is_none() {
-                    walk.step(self.tlas);
+        for walks in self.walks.chunks_mut(TURNS) {
+            let mut weights = [[0.0; N]; TURNS];
+            let mut going = true;
+            while going {
+                for (walk, weights) in walks.iter().zip(&mut weights).filter(|(walk, _)| walk.end.is_none()) {
+                    *weights = self.tlas.nodes[walk.node as usize].weights(&walk.sight, &walk.scene);
+                }
+                going = false;
+                for (walk, weights) in walks.iter_mut().zip(&weights).filter(|(walk, _)| walk.end.is_none()) {
+                    walk.choose(&self.tlas.nodes[walk.node as usize], weights);
                     prefetch(&self.tlas.nodes[walk.node as usize]);
                     going = true;
                 }

@@ -115,7 +115,13 @@ impl<const N: usize> Node<N> {
     /// A component of a lane's normal.
     #[inline(always)]
     pub(super) fn component(normal: u32, axis: u32) -> f32 {
-        ((normal << (22 - 10 * axis)).cast_signed() >> 22) as f32 * (1.0 / NORMAL_STEPS)
+        Self::steps(normal, axis) * (1.0 / NORMAL_STEPS)
+    }
+
+    /// The same in units of [`NORMAL_STEPS`].
+    #[inline(always)]
+    pub(super) fn steps(normal: u32, axis: u32) -> f32 {
+        ((normal << (22 - 10 * axis)).cast_signed() >> 22) as f32
     }
 
     /// Energies that do not depend on the direction, and those of portals.
