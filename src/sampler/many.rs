@@ -47,9 +47,12 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         for (leaf, _) in walks.iter().filter_map(Walk::leaf) {
             prefetch(&self.triangles[leaf as usize]);
         }
+        let Some((first, _)) = queries.first() else { return };
+        // Without suns, nothing but the point differs.
+        let mut at = self.at(first);
         for (i, sample) in samples.iter_mut().enumerate().take(walks.len()) {
-            let on = |(leaf, pmf)| self.at(&queries[i].0).sample_on(leaf, pmf, points[i]);
-            *sample = walks[i].leaf().and_then(on);
+            at.x = queries[i].0;
+            *sample = walks[i].leaf().and_then(|(leaf, pmf)| at.sample_on(leaf, pmf, points[i]));
         }
     }
 }
