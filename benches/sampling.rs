@@ -1,13 +1,15 @@
 //! Times of sampling, one thread.
 //!
 //! `cloud-N` is `N` small triangles at random in the unit cube, each a mesh with a radiance of its own; the shading
-//! points lie in and around the cube. The map between sphere and square is part of `environment/radiance`.
+//! points lie in and around the cube. `batch` runs 10,000,000 triangles as well if `FANLIGHT_LARGE` is set.
 
 use core::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use fanlight::{Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight};
-use glam::{DVec3, Vec3};
+use fanlight::{
+    Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight, sphere_to_square, square_to_sphere,
+};
+use glam::{DVec3, Vec2, Vec3};
 
 /// Shading points, and vectors of random numbers, that are gone through in a circle.
 const POINTS: usize = 1 << 16;
@@ -108,20 +110,6 @@ fn lights(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group(format!("cloud-{n}"));
         group.bench_function("sample", |b| in_circle(b, POINTS, |i| sampler.sample(&points[i], numbers[i])));
 
-        let queries: Vec<_> = points.iter().copied().zip(numbers.iter().copied()).collect();
-        for size in [1, 2, 4, 8, 16] {
-            let mut samples = [None; 16];
-            let mut batches = queries.chunks_exact(size).cycle();
-            group.throughput(Throughput::Elements(size as u64));
-            group.bench_function(BenchmarkId::new("sample_many", size), |b| {
-                b.iter(|| {
-                    sampler.sample_many(batches.next().unwrap_or_default(), &mut samples);
-                    samples
-                });
-            });
-        }
-        group.throughput(Throughput::Elements(1));
-
         // Densities of what was drawn: elsewhere they would be cheap zeros.
         let drawn: Vec<(ShadingPoint, Hit, Vec3)> = points
             .iter()
@@ -135,6 +123,30 @@ fn lights(criterion: &mut Criterion) {
         group.bench_function("pdf_direction", |b| {
             in_circle(b, drawn.len(), |i| sampler.pdf_direction(&drawn[i].0, drawn[i].2));
         });
+        group.finish();
+    }
+}
+
+/// Single calls against calls for several points.
+fn batch(criterion: &mut Criterion) {
+    let queries: Vec<_> = points().into_iter().zip(numbers()).collect();
+    let large = std::env::var_os("FANLIGHT_LARGE").map(|_| 10_000_000);
+    for n in [1_000, 100_000].into_iter().chain(large) {
+        let sampler = build(&cloud(n));
+        let mut group = criterion.benchmark_group(format!("batch/cloud-{n}"));
+        group.throughput(Throughput::Elements(1));
+        group.bench_function("single", |b| in_circle(b, POINTS, |i| sampler.sample(&queries[i].0, queries[i].1)));
+        for size in [1, 2, 4, 8, 16] {
+            let mut samples = [None; 16];
+            let mut batches = queries.chunks_exact(size).cycle();
+            group.throughput(Throughput::Elements(size as u64));
+            group.bench_function(BenchmarkId::from_parameter(size), |b| {
+                b.iter(|| {
+                    sampler.sample_many(batches.next().unwrap_or_default(), &mut samples);
+                    black_box(&samples);
+                });
+            });
+        }
         group.finish();
     }
 }
@@ -160,11 +172,27 @@ fn environment(criterion: &mut Criterion) {
     group.bench_function("pdf", |b| in_circle(b, POINTS, |i| sky.pdf(directions[i])));
     group.bench_function("sample", |b| in_circle(b, POINTS, |i| sky.sample([numbers[i][0], numbers[i][1]])));
     group.finish();
+
+    let squares: Vec<Vec2> = numbers.iter().map(|u| Vec2::new(u[0], u[1])).collect();
+    let mut group = criterion.benchmark_group("map");
+    group.bench_function("to sphere", |b| in_circle(b, POINTS, |i| square_to_sphere(squares[i])));
+    group.bench_function("to square", |b| in_circle(b, POINTS, |i| sphere_to_square(directions[i])));
+    group.finish();
+
+    let view = sky.as_view();
+    let mut group = criterion.benchmark_group("pyramid");
+    for sin_radius in [0.001, 0.03, 0.5] {
+        group.bench_function(BenchmarkId::new("look-up of a cone", sin_radius), |b| {
+            in_circle(b, POINTS, |i| view.radiance_of_cone(directions[i], sin_radius));
+        });
+    }
+    group.finish();
 }
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     environment(&mut criterion);
     lights(&mut criterion);
+    batch(&mut criterion);
     criterion.final_summary();
 }

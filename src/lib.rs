@@ -149,3 +149,6 @@ pub use sampler::{
     Sides, TextureId, Weight,
 };
 pub use tlas::Splitting;
+/// For the benches: no part of the interface.
+#[doc(hidden)]
+pub use warp::equal_area::{sphere_to_square, square_to_sphere};

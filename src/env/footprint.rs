@@ -69,6 +69,12 @@ struct Cover {
 }
 
 impl EnvironmentView<'_> {
+    /// Estimates the mean radiance of a cone around a unit vector. For the benches: no part of the interface.
+    #[doc(hidden)]
+    pub fn radiance_of_cone(&self, direction: Vec3, sin_radius: f32) -> f32 {
+        self.average(&Footprint::ball(direction, sin_radius)).value
+    }
+
     /// Estimates the mean radiance of a region.
     #[inline]
     pub(crate) fn average(&self, region: &Footprint) -> Average {

@@ -6,4 +6,4 @@ mod triangle;
 
 pub(crate) use aabb::Aabb;
 pub(crate) use cone::{Cone, angle};
-pub(crate) use triangle::{Triangle, intersect};
+pub(crate) use triangle::{Triangle, intersect, normal_and_area};

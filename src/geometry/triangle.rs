@@ -11,6 +11,7 @@ pub(crate) struct Triangle(pub(crate) [Vec3; 3]);
 impl Triangle {
     /// Cross product of two edges: normal of the front side times twice the area. In double precision, where the
     /// differences of coordinates of like size are exact, so that slivers keep their direction.
+    #[inline]
     pub(crate) fn double_area_vector(&self) -> DVec3 {
         let [a, b, c] = self.0.map(Vec3::as_dvec3);
         (b - a).cross(c - a)
@@ -19,9 +20,7 @@ impl Triangle {
     /// Unit normal of the front side and area, or `None` where the area is zero.
     pub(crate) fn normal_and_area(&self) -> Option<(Vec3, f32)> {
         let cross = self.double_area_vector();
-        let double_area = math::sqrt64(cross.length_squared());
-        let area = (0.5 * double_area) as f32;
-        (area > 0.0 && area.is_finite()).then(|| ((cross / double_area).as_vec3(), area))
+        normal_and_area(cross, math::sqrt64(cross.length_squared()))
     }
 
     /// Mean position, and mean squared distance from it.
@@ -31,22 +30,25 @@ impl Triangle {
         (a + ((b - a) + (c - a)) * (1.0 / 3.0), edges * (1.0 / 36.0))
     }
 
-    /// Height of a point over the triangle's plane, positive on the front side, with a sign that can be trusted.
-    pub(crate) fn height(&self, point: Vec3) -> f64 {
-        let cross = self.double_area_vector();
-        let length = math::sqrt64(cross.length_squared());
-        if length > 0.0 { cross.dot(point.as_dvec3() - self.0[0].as_dvec3()) / length } else { 0.0 }
-    }
-
     /// The vertices relative to a point, in double precision.
+    #[inline]
     pub(crate) fn exactly_relative_to(&self, point: Vec3) -> [DVec3; 3] {
         self.0.map(|vertex| vertex.as_dvec3() - point.as_dvec3())
     }
 
     /// The vertices relative to a point.
+    #[inline]
     pub(crate) fn relative_to(&self, point: Vec3) -> [Vec3; 3] {
         self.0.map(|vertex| vertex - point)
     }
+}
+
+/// Unit normal and area of a triangle by its [`Triangle::double_area_vector`] and the length of that, or `None` where
+/// the area is zero.
+#[inline]
+pub(crate) fn normal_and_area(cross: DVec3, double_area: f64) -> Option<(Vec3, f32)> {
+    let area = (0.5 * double_area) as f32;
+    (area > 0.0 && area.is_finite()).then(|| ((cross / double_area).as_vec3(), area))
 }
 
 /// Barycentrics `b1`, `b2` of the point where the ray from the origin along `direction` crosses the triangle with
@@ -72,12 +74,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heights_have_the_side_as_their_sign() {
+    fn the_side_of_a_point_is_a_sign() {
         let triangle =
             Triangle([Vec3::new(1e3, 1e3, 1e3), Vec3::new(1e3 + 1.0, 1e3, 1e3), Vec3::new(1e3, 1e3 + 1.0, 1e3)]);
-        assert!(triangle.height(Vec3::new(1000.25, 1000.25, 1000.0001)) > 0.0);
-        assert!(triangle.height(Vec3::new(1000.25, 1000.25, 999.9999)) < 0.0);
-        assert_eq!(triangle.height(Vec3::new(1000.25, 1000.75, 1000.0)), 0.0);
+        let side = |x, y, z| triangle.double_area_vector().dot(triangle.exactly_relative_to(Vec3::new(x, y, z))[0]);
+        assert!(side(1000.25, 1000.25, 1000.0001) < 0.0);
+        assert!(side(1000.25, 1000.25, 999.9999) > 0.0);
+        assert_eq!(side(1000.25, 1000.75, 1000.0), 0.0);
         assert_eq!(triangle.normal_and_area(), Some((Vec3::Z, 0.5)));
     }
 

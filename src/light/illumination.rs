@@ -129,6 +129,7 @@ fn clamped_vertices<const M: usize>(receiver: &Receiver, cells: &Views<M>) -> [f
 
 /// Height over the receiver's plane below which a vertex is so for certain, whatever rounding has done to those of
 /// cells of the triangle with these vertices.
+#[inline]
 pub(crate) fn horizon(normal: Vec3, vertices: &[Vec3; 3]) -> f32 {
     let largest = vertices.iter().fold(0.0, |largest: f32, v| largest.max(normal.abs().dot(v.abs())));
     -ROUNDING * largest

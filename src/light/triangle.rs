@@ -7,6 +7,7 @@ use super::illumination::{Illumination, horizon, is_below};
 use crate::blas::{Lattice, Root};
 use crate::env::EnvironmentView;
 use crate::geometry::{self, Triangle};
+use crate::math;
 use crate::record::{Receiver, ShadingPoint};
 
 /// Largest coordinate of a vertex: squares of squares of distances must not overflow where the tree is built.
@@ -35,6 +36,7 @@ impl LightTriangle {
     /// Shows the environment behind it.
     pub(crate) const PORTAL: u32 = 1 << 30;
 
+    #[inline]
     pub(crate) fn triangle(&self) -> Triangle {
         Triangle(self.vertices.map(Vec3::from))
     }
@@ -60,16 +62,26 @@ impl LightTriangle {
 
     /// Whether anything can travel from the triangle to the shading point: the point is on a side that sends, and
     /// some of the triangle is above its horizon.
+    #[inline]
     pub(crate) fn is_visible(&self, x: &ShadingPoint) -> bool {
         let triangle = self.triangle();
-        let height = triangle.height(x.position);
-        if !(height > 0.0 || (height < 0.0 && self.is_two_sided())) {
-            return false;
-        }
-        match x.receiver {
-            Receiver::Surface(normal) => !is_below(normal, &triangle.relative_to(x.position)),
-            Receiver::Transmissive(_) | Receiver::Volume => true,
-        }
+        let side = triangle.double_area_vector().dot(triangle.exactly_relative_to(x.position)[0]);
+        self.sends_to(side) && is_above(&triangle.relative_to(x.position), x.receiver)
+    }
+
+    /// Whether it sends to points on a side. Negative is the front; anything but a number is no side.
+    #[inline]
+    fn sends_to(&self, side: f64) -> bool {
+        side < 0.0 || (side > 0.0 && self.is_two_sided())
+    }
+}
+
+/// Whether any of the vertices, which are relative to it, may be above a receiver's horizon.
+#[inline]
+fn is_above(vertices: &[Vec3; 3], receiver: Receiver) -> bool {
+    match receiver {
+        Receiver::Surface(normal) => !is_below(normal, vertices),
+        Receiver::Transmissive(_) | Receiver::Volume => true,
     }
 }
 
@@ -98,26 +110,30 @@ pub(crate) struct Lit<'a> {
     pub(super) highest: f32,
     pub(super) illumination: Illumination,
     /// What the triangle is a portal to, if that depends on the direction.
-    pub(super) environment: Option<EnvironmentView<'a>>,
+    pub(super) environment: Option<&'a EnvironmentView<'a>>,
 }
 
 impl<'a> Lit<'a> {
     /// The view from a shading point, or `None` where nothing can arrive.
+    #[inline]
     pub(crate) fn new(
         light: &LightTriangle,
         x: &ShadingPoint,
         illumination: Illumination,
-        environment: Option<EnvironmentView<'a>>,
+        environment: Option<&'a EnvironmentView<'a>>,
     ) -> Option<Self> {
         // NaN fails.
         let is_near = x.position.to_array().iter().all(|x| x.abs() <= FAR);
-        if !is_near || !light.is_visible(x) {
+        let triangle = light.triangle();
+        let (exact_vertices, vertices) = (triangle.exactly_relative_to(x.position), triangle.relative_to(x.position));
+        let cross = triangle.double_area_vector();
+        let side = cross.dot(exact_vertices[0]);
+        if !(is_near && light.sends_to(side) && is_above(&vertices, x.receiver)) {
             return None;
         }
-        let triangle = light.triangle();
-        let (normal, area) = triangle.normal_and_area()?;
-        let height = triangle.height(x.position).abs();
-        let vertices = triangle.relative_to(x.position);
+        let double_area = math::sqrt64(cross.length_squared());
+        let (normal, area) = geometry::normal_and_area(cross, double_area)?;
+        let height = side.abs() / double_area;
         let [a, b, c] = vertices;
         let center = (a + b + c) * (1.0 / 3.0);
         let normal_of_receiver = match x.receiver {
@@ -131,7 +147,7 @@ impl<'a> Lit<'a> {
             normal_of_receiver,
             horizon: horizon(normal_of_receiver, &vertices),
             highest: vertices.iter().fold(0.0, |h: f32, v| h.max(normal_of_receiver.dot(*v).abs())),
-            exact_vertices: triangle.exactly_relative_to(x.position),
+            exact_vertices,
             normal,
             area,
             height: height as f32,
@@ -159,7 +175,7 @@ impl<'a> Lit<'a> {
     #[inline]
     pub(crate) fn solid_angle_per_area(&self, point: DVec3) -> f64 {
         let distance2 = point.length_squared();
-        self.exact_height / (distance2 * crate::math::sqrt64(distance2))
+        self.exact_height / (distance2 * math::sqrt64(distance2))
     }
 
     /// Density per solid angle of a point with this density per area, at this place relative to the shading point:

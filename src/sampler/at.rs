@@ -13,13 +13,15 @@ pub struct PointSampler<'a, const N: usize = 8, const M: usize = 4> {
     pub(super) lights: LightSamplerView<'a, N, M>,
     pub(super) x: ShadingPoint,
     pub(super) techniques: Techniques,
+    /// Weights of the tree's first choice, where they are known already.
+    pub(super) first_weights: Option<[f32; N]>,
 }
 
 impl<const N: usize, const M: usize> LightSampler<N, M> {
     /// The lights as seen from one shading point, for more than one question about it.
     #[inline]
     pub fn at(&self, x: &ShadingPoint) -> PointSampler<'_, N, M> {
-        self.as_view().at(x)
+        self.as_view().into_at(x)
     }
 }
 
@@ -27,6 +29,16 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     /// The lights as seen from one shading point, for more than one question about it.
     #[inline]
     pub fn at(&self, x: &ShadingPoint) -> PointSampler<'a, N, M> {
-        PointSampler { lights: *self, x: *x, techniques: self.techniques(x) }
+        self.into_at(x)
+    }
+
+    /// The same of a view that is not needed any more.
+    #[inline(always)]
+    fn into_at(self, x: &ShadingPoint) -> PointSampler<'a, N, M> {
+        if self.has_suns() {
+            let (techniques, first_weights) = self.weigh(x);
+            return PointSampler { lights: self, x: *x, techniques, first_weights };
+        }
+        PointSampler { lights: self, x: *x, techniques: Techniques::trees(), first_weights: None }
     }
 }

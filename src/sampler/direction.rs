@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::at::PointSampler;
 use super::sample::to_finite;
 use crate::blas::Lattice;
+use crate::geometry;
 use crate::record::LightSample;
 use crate::tlas::Splitting;
 
@@ -31,9 +32,11 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
             if Some(leaf) == except {
                 return;
             }
-            let Some(lit) = self.lights.lit(leaf, &self.x) else { return };
-            if let Some(hit) = lit.intersect(direction) {
-                density += self.density(leaf, Lattice::from_barycentrics(hit), &lit, splitting);
+            let triangle = self.lights.triangles[leaf as usize].triangle();
+            let vertices = triangle.exactly_relative_to(self.x.position);
+            let Some(hit) = geometry::intersect(vertices, direction) else { return };
+            if let Some(lit) = &self.lights.lit(leaf, &self.x) {
+                density += self.density(leaf, Lattice::from_barycentrics(hit), lit, splitting);
             }
         });
         density

@@ -156,7 +156,8 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     }
 
     /// A triangle as seen from a shading point; `None` if nothing can arrive from it.
-    pub(super) fn lit(&self, leaf: u32, x: &ShadingPoint) -> Option<Lit<'a>> {
+    #[inline]
+    pub(super) fn lit(&self, leaf: u32, x: &ShadingPoint) -> Option<Lit<'_>> {
         Lit::new(&self.triangles[leaf as usize], x, self.illumination, self.directional_environment())
     }
 
@@ -170,8 +171,8 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     }
 
     /// The environment, if what it shows depends on the direction.
-    fn directional_environment(&self) -> Option<EnvironmentView<'a>> {
-        (!self.environment.is_constant()).then_some(self.environment)
+    fn directional_environment(&self) -> Option<&EnvironmentView<'a>> {
+        (!self.environment.is_constant()).then_some(&self.environment)
     }
 
     /// What the tree over triangles asks for at a shading point.

@@ -2,16 +2,14 @@
 
 use smallvec::SmallVec;
 
+#[cfg(doc)]
 use super::at::PointSampler;
 use super::lights::{LightSampler, LightSamplerView, Scene};
 use super::sample::variates;
-use super::techniques::{Technique, Techniques};
 use crate::record::{LightSample, ShadingPoint};
 use crate::simd::prefetch;
-use crate::tlas::Walk;
-
-/// Walks down the tree that take turns: enough to hide what one waits for, few enough to stay in the cache.
-const TURNS: usize = 8;
+use crate::tlas::{TURNS, Walk};
+use crate::warp::Variate;
 
 impl<const N: usize, const M: usize> LightSampler<N, M> {
     /// See [`LightSamplerView::sample_many`].
@@ -27,6 +25,11 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     ///
     /// Where one slice is longer, the rest of it is left alone.
     pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
+        // A sample is mostly the search for suns, where there are any.
+        if self.has_suns() {
+            let each = queries.iter().zip(samples);
+            return each.for_each(|((x, u), sample)| *sample = self.sample(x, *u));
+        }
         for (queries, samples) in queries.chunks(TURNS).zip(samples.chunks_mut(TURNS)) {
             self.sample_few(queries, samples);
         }
@@ -34,30 +37,22 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
 
     fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
         let mut walks = SmallVec::<[Walk<Scene<'_>>; TURNS]>::new();
-        // The places and techniques of those that go down the tree.
-        let mut waiting = SmallVec::<[(usize, Techniques); TURNS]>::new();
-        for (i, ((x, u), sample)) in queries.iter().zip(&mut *samples).enumerate() {
-            let techniques = self.techniques(x);
-            let [mut choice, point @ ..] = variates(*u);
-            match techniques.choose(&mut choice) {
-                Technique::Sun(sun) => {
-                    *sample = PointSampler { lights: *self, x: *x, techniques }.sample_sun(sun, point, None);
-                }
-                Technique::Trees => {
-                    walks.push(Walk::new(x, self.scene(x), choice));
-                    waiting.push((i, techniques));
-                }
-            }
+        let mut points = SmallVec::<[[Variate; 2]; TURNS]>::new();
+        for (x, u) in queries {
+            let [choice, point @ ..] = variates(*u);
+            walks.push(Walk::new(x, self.scene(x), choice));
+            points.push(point);
         }
         self.tlas.sample_many(&mut walks);
         for (leaf, _) in walks.iter().filter_map(Walk::leaf) {
             prefetch(&self.triangles[leaf as usize]);
         }
-        for (walk, &(i, techniques)) in walks.iter().zip(&waiting) {
-            let (x, u) = queries[i];
-            let [_, point @ ..] = variates(u);
-            let at = PointSampler { lights: *self, x, techniques };
-            samples[i] = walk.leaf().and_then(|(leaf, pmf)| at.sample_on(leaf, pmf, point));
+        let Some((first, _)) = queries.first() else { return };
+        // Without suns, nothing but the point differs.
+        let mut at = self.at(first);
+        for (i, sample) in samples.iter_mut().enumerate().take(walks.len()) {
+            at.x = queries[i].0;
+            *sample = walks[i].leaf().and_then(|(leaf, pmf)| at.sample_on(leaf, pmf, points[i]));
         }
     }
 }

@@ -27,7 +27,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     pub(super) fn tree_count(&self, leaf: u32, splitting: Option<&Splitting>) -> f64 {
         let scene = self.lights.scene(&self.x);
         match splitting {
-            None => self.lights.tlas.pmf(leaf, &self.x, &scene),
+            None => self.lights.tlas.pmf(leaf, &self.x, &scene, self.first_weights.as_ref()),
             Some(splitting) => self.lights.tlas.expected_count(leaf, &self.x, &scene, splitting),
         }
     }
@@ -35,8 +35,9 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Density per solid angle of a hit by all techniques.
     pub(super) fn pdf_of_hit(&self, hit: &Hit, splitting: Option<&Splitting>) -> f32 {
         let Some(leaf) = self.lights.leaf(hit.triangle) else { return 0.0 };
-        let Some(lit) = self.lights.lit(leaf, &self.x) else { return 0.0 };
-        to_finite(self.density(leaf, Lattice::from_barycentrics(hit.barycentrics), &lit, splitting))
+        let lit = &self.lights.lit(leaf, &self.x);
+        let Some(lit) = lit else { return 0.0 };
+        to_finite(self.density(leaf, Lattice::from_barycentrics(hit.barycentrics), lit, splitting))
     }
 
     /// Density per solid angle of a point of a triangle by all techniques.

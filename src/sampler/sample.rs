@@ -19,7 +19,8 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
         match self.techniques.choose(&mut choice) {
             Technique::Sun(sun) => self.sample_sun(sun, point, None),
             Technique::Trees => {
-                let (leaf, pmf) = self.lights.tlas.sample(&self.x, &self.lights.scene(&self.x), choice)?;
+                let scene = self.lights.scene(&self.x);
+                let (leaf, pmf) = self.lights.tlas.sample(&self.x, &scene, self.first_weights.as_ref(), choice)?;
                 self.sample_on(leaf, pmf, point)
             }
         }
@@ -28,13 +29,15 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Draws a point on one triangle, which the trees choose with probability (or are expected to visit so often)
     /// `count`.
     pub(super) fn sample_on(&self, leaf: u32, count: f64, u: [Variate; 2]) -> Option<LightSample> {
-        let lit = self.lights.lit(leaf, &self.x)?;
+        // By reference: what `?` moves is copied.
+        let lit = &self.lights.lit(leaf, &self.x);
+        let lit = lit.as_ref()?;
         let mut draw = Draw::new(u);
         let root = self.lights.triangles[leaf as usize].root;
-        let (cell, cell_pmf) = blas::descend(self.lights.cells, root, lit.vertices, &lit, &mut draw)?;
+        let (cell, cell_pmf) = blas::descend(self.lights.cells, root, lit.vertices, lit, &mut draw)?;
         let place = draw.point(cell.domain);
-        let tree_pdf = count * lit.per_solid_angle(pdf_area(&lit, &cell, cell_pmf), lit.point(place))?;
-        self.finish(&Drawn { leaf, place, count, tree_pdf }, &lit)
+        let tree_pdf = count * lit.per_solid_angle(pdf_area(lit, &cell, cell_pmf), lit.point(place))?;
+        self.finish(&Drawn { leaf, place, count, tree_pdf }, lit)
     }
 
     /// Draws a point on a portal towards a sun.

@@ -27,7 +27,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
             let key = 4 * u64::from(draw) + i as u64;
             Variate::scrambled(u[i], key, salt ^ key)
         };
-        let this = self.side_by_side();
+        let this = &self.side_by_side();
         let mut visits = 0;
         self.lights.tlas.sample_split(
             &self.x,
@@ -62,6 +62,8 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
 
     /// The trees in any case, and one of the suns next to them.
     fn side_by_side(&self) -> Self {
-        Self { techniques: self.techniques.side_by_side(), ..*self }
+        let mut this = *self;
+        this.techniques.put_side_by_side();
+        this
     }
 }

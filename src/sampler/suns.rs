@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::at::PointSampler;
 use super::lights::LightSamplerView;
-use super::techniques::{ANY, MAX_SEEN, Seen, Techniques};
+use super::techniques::{ANY, MAX_SEEN, Pairs, Seen, Techniques};
 use crate::blas::{self, Lattice, Shape};
 use crate::env::Sun;
 use crate::geometry;
@@ -20,41 +20,42 @@ use crate::record::{Receiver, ShadingPoint};
 use crate::warp::Variate;
 
 impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
-    /// What each technique is worth at a shading point.
+    /// Whether suns may be seen through portals.
     #[inline]
-    pub(super) fn techniques(&self, x: &ShadingPoint) -> Techniques {
-        if self.environment.suns().is_empty() || !self.has_portals() {
-            return Techniques::TREES;
-        }
-        self.weigh(x)
+    pub(super) fn has_suns(&self) -> bool {
+        !self.environment.suns().is_empty() && self.has_portals()
     }
 
-    fn weigh(&self, x: &ShadingPoint) -> Techniques {
-        let mut techniques = Techniques::TREES;
+    /// What each technique is worth at a shading point, and the weights of the tree's first choice if that took them.
+    pub(super) fn weigh(&self, x: &ShadingPoint) -> (Techniques, Option<[f32; N]>) {
+        let mut pairs = Pairs::NONE;
         for sun in 0..self.environment.suns().len() {
-            self.find(sun, x, &mut techniques);
+            self.find(sun, x, &mut pairs);
         }
-        techniques.balance(|| self.irradiance_by_trees(x))
+        let mut weights = None;
+        let techniques = Techniques::balance(pairs, || {
+            weights = self.tlas.first_weights(x, &self.scene(x));
+            weights.map_or_else(|| self.irradiance_from_one(x), |weights| self.energy * weights.iter().sum::<f32>())
+        });
+        (techniques, weights)
     }
 
-    /// Estimate of the irradiance from all that the trees hold. Zero only if there is none.
-    fn irradiance_by_trees(&self, x: &ShadingPoint) -> f32 {
-        if let [light] = self.triangles {
-            let Some(lit) = self.lit(0, x) else { return 0.0 };
-            return PI * light.root.average * self.scale(light) * lit.worth(&blas::Cell::root(lit.vertices)).weight;
-        }
-        self.energy * self.tlas.irradiance(x, &self.scene(x))
+    /// Estimate of the irradiance from the only triangle. Zero only if there is none.
+    fn irradiance_from_one(&self, x: &ShadingPoint) -> f32 {
+        let [light] = self.triangles else { return 0.0 };
+        let Some(lit) = self.lit(0, x) else { return 0.0 };
+        PI * light.root.average * self.scale(light) * lit.worth(&blas::Cell::root(lit.vertices)).weight
     }
 
     /// Appends the portals that a sun is seen through.
-    fn find(&self, sun: usize, x: &ShadingPoint, techniques: &mut Techniques) {
+    fn find(&self, sun: usize, x: &ShadingPoint, pairs: &mut Pairs) {
         let axis = self.environment.sun_axis(sun);
         let Sun { sin_radius, power, .. } = self.environment.suns()[sun];
         let cosine = mean_cosine(x.receiver, axis, sin_radius);
         if cosine == 0.0 {
             return;
         }
-        let start = techniques.len();
+        let start = pairs.len();
         // Every sun after this one keeps a place.
         let end = MAX_SEEN - (self.environment.suns().len() - 1 - sun);
         let mut more = 0.0;
@@ -71,16 +72,16 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
             }
             let Some(lit) = self.lit(leaf, x) else { return };
             self.sunlit(&lit, sun).visit(self.cells, light.root, &mut |part, through| {
-                if techniques.len() < end {
-                    techniques.push(leaf, sun, part, through * scale * cosine);
+                if pairs.len() < end {
+                    pairs.push(leaf, sun, part, through * scale * cosine);
                 } else {
                     more += 1.0;
                 }
             });
         });
         if more > 0.0 {
-            let all = techniques.irradiance(start) * (1.0 + more / (end - start) as f32);
-            techniques.merge(start, sun, all.min(power * cosine));
+            let all = pairs.irradiance(start) * (1.0 + more / (end - start) as f32);
+            pairs.merge(start, sun, all.min(power * cosine));
         }
     }
 
@@ -111,7 +112,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
 impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Draws a point on a portal towards a sun, by its place in the list.
     pub(super) fn sun_point(&self, index: usize, u: [Variate; 2]) -> Option<(u32, Lattice)> {
-        let Seen { leaf, sun, part } = self.techniques.seen(index);
+        let Seen { leaf, sun, part } = self.techniques.suns()?.seen(index);
         let (lights, sun) = (&self.lights, sun as usize);
         if leaf == ANY {
             return lights.least_crossed(&self.x, lights.environment.sample_sun(sun, u));
@@ -123,9 +124,12 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
     /// Density per solid angle of a point of a portal by the suns.
     #[inline]
     pub(super) fn sun_pdf(&self, leaf: u32, place: Lattice, lit: &Lit<'_>) -> f64 {
-        if self.techniques.is_trees() {
-            return 0.0;
-        }
+        let Some(pairs) = self.techniques.suns() else { return 0.0 };
+        self.techniques.per_weight * self.sun_pdf_of(pairs, leaf, place, lit)
+    }
+
+    /// The same, with weights for probabilities.
+    fn sun_pdf_of(&self, pairs: &Pairs, leaf: u32, place: Lattice, lit: &Lit<'_>) -> f64 {
         let direction = lit.point(place).normalize_or_zero().as_vec3();
         let environment = &self.lights.environment;
         let mut pdf = 0.0;
@@ -134,13 +138,13 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
             if excess == 0.0 {
                 continue;
             }
-            for (seen, weight) in self.techniques.of_sun(sun) {
+            for (seen, weight) in pairs.of_sun(sun) {
                 if seen.leaf == ANY || (seen.leaf == leaf && seen.part.domain.holds(place)) {
                     pdf += f64::from(weight) * excess * self.sun_pdf_per_excess(seen, leaf, place, lit, direction);
                 }
             }
         }
-        self.techniques.per_weight * pdf
+        pdf
     }
 
     /// Density per solid angle of a point of a portal by one sun, over the sun's excess there.

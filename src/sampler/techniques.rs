@@ -27,13 +27,20 @@ pub(super) struct Seen {
     pub(super) part: Part,
 }
 
-/// How often each technique is used at one shading point.
+/// Suns through parts of portals.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Techniques {
+pub(super) struct Pairs {
     seen: [Seen; MAX_SEEN],
     /// Irradiance from each.
     weights: [f32; MAX_SEEN],
     count: usize,
+}
+
+/// How often each technique is used at one shading point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Techniques {
+    /// Nothing where no sun is seen: a list would take longer to write than many a sample to draw.
+    pairs: Option<Pairs>,
     /// Irradiance from the trees.
     rest: f32,
     /// Probability of the trees; 1 if they are used anyway.
@@ -50,51 +57,12 @@ pub(super) enum Technique {
     Sun(usize),
 }
 
-impl Techniques {
-    /// The trees alone.
-    pub(super) const TREES: Self = Self {
-        seen: [Seen { leaf: 0, sun: 0, part: Part::WHOLE }; MAX_SEEN],
-        weights: [0.0; MAX_SEEN],
-        count: 0,
-        rest: 1.0,
-        trees: 1.0,
-        per_weight: 0.0,
-    };
-
-    /// Whether no sun is seen.
-    #[inline]
-    pub(super) fn is_trees(&self) -> bool {
-        self.per_weight == 0.0
-    }
+impl Pairs {
+    pub(super) const NONE: Self =
+        Self { seen: [Seen { leaf: 0, sun: 0, part: Part::WHOLE }; MAX_SEEN], weights: [0.0; MAX_SEEN], count: 0 };
 
     fn weights(&self) -> &[f32] {
         &self.weights[..self.count]
-    }
-
-    /// Chooses one technique.
-    #[inline]
-    pub(super) fn choose(&self, u: &mut Variate) -> Technique {
-        if self.is_trees() {
-            return Technique::Trees;
-        }
-        let suns = sum(self.weights());
-        match pick_pair([suns as f32, self.rest], u) {
-            0 => Technique::Sun(pick(self.weights(), suns, u)),
-            _ => Technique::Trees,
-        }
-    }
-
-    /// The trees in any case, and one of the suns next to them.
-    pub(super) fn side_by_side(self) -> Self {
-        if self.is_trees() {
-            return self;
-        }
-        Self { trees: 1.0, per_weight: 1.0 / sum(self.weights()), ..self }
-    }
-
-    /// Chooses among the suns alone, if any is seen.
-    pub(super) fn choose_sun(&self, u: &mut Variate) -> Option<usize> {
-        (!self.is_trees()).then(|| pick(self.weights(), sum(self.weights()), u))
     }
 
     /// Number of pairs so far.
@@ -130,17 +98,54 @@ impl Techniques {
         let pairs = self.seen.iter().copied().zip(self.weights().iter().copied());
         pairs.filter(move |(seen, _)| seen.sun as usize == sun)
     }
+}
+
+impl Techniques {
+    /// The trees alone. Not a constant, of which compilers copy the room for a list as well.
+    #[inline(always)]
+    pub(super) fn trees() -> Self {
+        Self { pairs: None, rest: 1.0, trees: 1.0, per_weight: 0.0 }
+    }
+
+    /// The suns that are seen, if any is.
+    #[inline]
+    pub(super) fn suns(&self) -> Option<&Pairs> {
+        self.pairs.as_ref()
+    }
+
+    /// Chooses one technique.
+    #[inline]
+    pub(super) fn choose(&self, u: &mut Variate) -> Technique {
+        let Some(pairs) = &self.pairs else { return Technique::Trees };
+        let suns = sum(pairs.weights());
+        match pick_pair([suns as f32, self.rest], u) {
+            0 => Technique::Sun(pick(pairs.weights(), suns, u)),
+            _ => Technique::Trees,
+        }
+    }
+
+    /// Uses the trees in any case, and one of the suns next to them.
+    pub(super) fn put_side_by_side(&mut self) {
+        if let Some(pairs) = &self.pairs {
+            (self.trees, self.per_weight) = (1.0, 1.0 / sum(pairs.weights()));
+        }
+    }
+
+    /// Chooses among the suns alone, if any is seen.
+    pub(super) fn choose_sun(&self, u: &mut Variate) -> Option<usize> {
+        self.pairs.as_ref().map(|pairs| pick(pairs.weights(), sum(pairs.weights()), u))
+    }
 
     /// Balances the pairs with the trees, which are estimated to send so much.
-    pub(super) fn balance(mut self, trees: impl FnOnce() -> f32) -> Self {
-        let suns = self.irradiance(0);
+    #[inline]
+    pub(super) fn balance(pairs: Pairs, trees: impl FnOnce() -> f32) -> Self {
+        let suns = pairs.irradiance(0);
         if !(suns > 0.0 && suns < BRIGHTEST) {
-            return Self::TREES;
+            return Self::trees();
         }
         let trees = trees();
-        self.rest = if trees > 0.0 { trees.max(LEAST_TREES * suns).min(BRIGHTEST) } else { 0.0 };
-        let total = f64::from(suns) + f64::from(self.rest);
-        (self.trees, self.per_weight) = (f64::from(self.rest) / total, 1.0 / total);
-        self
+        let rest = if trees > 0.0 { trees.max(LEAST_TREES * suns).min(BRIGHTEST) } else { 0.0 };
+        let total = f64::from(suns) + f64::from(rest);
+        Self { pairs: Some(pairs), rest, trees: f64::from(rest) / total, per_weight: 1.0 / total }
     }
 }

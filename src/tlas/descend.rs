@@ -6,6 +6,9 @@ use crate::record::ShadingPoint;
 use crate::simd::{Level, Work, prefetch};
 use crate::warp::{Variate, pick_wide, pmf_wide};
 
+/// Walks that take turns: enough to hide what one waits for, few enough to stay in the cache.
+pub(crate) const TURNS: usize = 8;
+
 /// A way down the tree, as far as it has got.
 pub(crate) struct Walk<S> {
     sight: Sight,
@@ -35,8 +38,13 @@ impl<S: Scene> Walk<S> {
     #[inline(always)]
     fn step<const N: usize>(&mut self, tlas: &TlasView<'_, N>) {
         let node = &tlas.nodes[self.node as usize];
-        let weights = node.weights(&self.sight, &self.scene);
-        let Some((lane, share)) = pick_wide(&weights, &mut self.u) else {
+        self.choose(node, &node.weights(&self.sight, &self.scene));
+    }
+
+    /// Chooses a child by the weights of all.
+    #[inline(always)]
+    fn choose<const N: usize>(&mut self, node: &Node<N>, weights: &[f32; N]) {
+        let Some((lane, share)) = pick_wide(weights, &mut self.u) else {
             self.end = Some(None);
             return;
         };
@@ -67,7 +75,8 @@ impl<const N: usize, S: Scene> Work for Draw<'_, N, S> {
     }
 }
 
-/// Several ways down, one step each in turn: while one waits for memory and for sums, the others go on.
+/// Several ways down, one step each in turn, and each step in two halves: while one way waits for memory or for sums,
+/// the others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
 struct DrawMany<'a, const N: usize, S> {
     tlas: &'a TlasView<'a, N>,
     walks: &'a mut [Walk<S>],
@@ -78,12 +87,16 @@ impl<const N: usize, S: Scene> Work for DrawMany<'_, N, S> {
 
     #[inline(always)]
     fn run(self) {
-        let mut going = true;
-        while going {
-            going = false;
-            for walk in &mut *self.walks {
-                if walk.end.is_none() {
-                    walk.step(self.tlas);
+        for walks in self.walks.chunks_mut(TURNS) {
+            let mut weights = [[0.0; N]; TURNS];
+            let mut going = true;
+            while going {
+                for (walk, weights) in walks.iter().zip(&mut weights).filter(|(walk, _)| walk.end.is_none()) {
+                    *weights = self.tlas.nodes[walk.node as usize].weights(&walk.sight, &walk.scene);
+                }
+                going = false;
+                for (walk, weights) in walks.iter_mut().zip(&weights).filter(|(walk, _)| walk.end.is_none()) {
+                    walk.choose(&self.tlas.nodes[walk.node as usize], weights);
                     prefetch(&self.tlas.nodes[walk.node as usize]);
                     going = true;
                 }
@@ -98,6 +111,8 @@ pub(super) struct Follow<'a, const N: usize, S> {
     pub(super) leaf: u32,
     pub(super) x: &'a ShadingPoint,
     pub(super) scene: &'a S,
+    /// Weights of the root, if they are known.
+    pub(super) first: Option<&'a [f32; N]>,
 }
 
 impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
@@ -111,7 +126,10 @@ impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
         let mut pmf = 1.0;
         // Not a fold, whose closure would be compiled for the baseline.
         for (node, lane) in self.tlas.path(self.leaf) {
-            pmf *= pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane);
+            pmf *= match self.first {
+                Some(weights) if node == 0 => pmf_wide(weights, lane),
+                _ => pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane),
+            };
         }
         pmf
     }
@@ -142,12 +160,20 @@ impl<const N: usize> Node<N> {
 
 impl<const N: usize> TlasView<'_, N> {
     /// Draws a leaf. Returns it with its probability; `None` where nothing can arrive from the part of the tree
-    /// that `u` leads to.
-    pub(crate) fn sample(&self, x: &ShadingPoint, scene: &impl Scene, u: Variate) -> Option<(u32, f64)> {
-        if self.nodes.is_empty() {
-            return self.single_leaf(scene).then_some((0, 1.0));
+    /// that `u` leads to. `first` are [`Self::first_weights`], if they are known.
+    pub(crate) fn sample(
+        &self,
+        x: &ShadingPoint,
+        scene: &impl Scene,
+        first: Option<&[f32; N]>,
+        u: Variate,
+    ) -> Option<(u32, f64)> {
+        let Some(root) = self.nodes.first() else { return self.single_leaf(scene).then_some((0, 1.0)) };
+        let mut walk = Walk::new(x, scene, u);
+        if let Some(weights) = first {
+            walk.choose(root, weights);
         }
-        self.sample_below(0, x, scene, u)
+        Level::best().run(Draw { tlas: self, walk })
     }
 
     /// Draws a leaf below a node.
@@ -174,17 +200,17 @@ impl<const N: usize> TlasView<'_, N> {
     }
 
     /// Probability with which [`Self::sample`] draws a leaf.
-    pub(crate) fn pmf(&self, leaf: u32, x: &ShadingPoint, scene: &impl Scene) -> f64 {
+    pub(crate) fn pmf(&self, leaf: u32, x: &ShadingPoint, scene: &impl Scene, first: Option<&[f32; N]>) -> f64 {
         if self.nodes.is_empty() {
             return if self.single_leaf(scene) { 1.0 } else { 0.0 };
         }
-        Level::best().run(Follow { tlas: self, leaf, x, scene })
+        Level::best().run(Follow { tlas: self, leaf, x, scene, first })
     }
 
-    /// Estimate of the irradiance from all leaves, in units of the sum of their energies. Zero for a tree without
-    /// nodes.
-    pub(crate) fn irradiance(&self, x: &ShadingPoint, scene: &impl Scene) -> f32 {
-        self.nodes.first().map_or(0.0, |root| root.weigh(x, scene).iter().sum())
+    /// Weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
+    /// energies; `None` for a tree without nodes.
+    pub(crate) fn first_weights(&self, x: &ShadingPoint, scene: &impl Scene) -> Option<[f32; N]> {
+        self.nodes.first().map(|root| root.weigh(x, scene))
     }
 
     /// Nodes and lanes on the way from a leaf to the root.

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use super::node::{ALL, Child, MEAN_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
+use super::node::{ALL, Child, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
 use crate::math::{self, at_least, only_if};
 use crate::record::{Receiver, ShadingPoint};
 use crate::warp::{keep_least, within_range};
@@ -165,39 +165,44 @@ impl<const N: usize> Node<N> {
             // The emitters' side: the angle between the axis and the direction to any point of the box, by the box's
             // nearest corner along the axis and the ball around it across.
             let bits = normals[i];
-            let axis = Vec3::new(Self::component(bits, 0), Self::component(bits, 1), Self::component(bits, 2));
+            let axis = Vec3::new(Self::steps(bits, 0), Self::steps(bits, 1), Self::steps(bits, 2));
             let (radius2, distance2) = (half.length_squared(), center.length_squared());
             let along = axis.dot(center);
             let radius = math::sqrt(radius2);
-            let across = math::sqrt(at_least(distance2 - along * along, 0.0)) + radius;
-            let root = f32::from(tangents[i]) * (1.0 / TANGENT_STEPS);
-            let away = along - axis.abs().dot(half) > root * root * across;
+            let code = f32::from(tangents[i]);
+            let tangent = code * code * (1.0 / (TANGENT_STEPS * TANGENT_STEPS));
+            // In steps of the axis. Squared, for want of a root of the distance across.
+            let across2 = at_least(NORMAL_STEPS * NORMAL_STEPS * distance2 - along * along, 0.0);
+            let beyond = along - axis.abs().dot(half) - tangent * NORMAL_STEPS * radius;
+            let away = (beyond > 0.0) & (beyond * beyond > tangent * tangent * across2) & (code < f32::from(WIDE));
 
             // What arrives, by the moments.
             let mean = Vec3::new(f32::from(means[0][i]), f32::from(means[1][i]), f32::from(means[2][i]));
             let to_mean = center + mean * (counts * mean_step);
-            let deviation = f32::from(deviations[i]) * (1.0 / 255.0);
-            let length = f32::from(lengths[i]) * (1.0 / 255.0);
-            let variance = deviation * deviation * radius2;
+            let deviation = f32::from(deviations[i]);
+            let length = f32::from(lengths[i]);
+            let variance = deviation * deviation * (1.0 / (255.0 * 255.0)) * radius2;
             let squared = at_least(to_mean.length_squared() + DISTANCE_SHARE * variance, LEAST_SQUARED);
             let (inverse2, distance) = (1.0 / squared, math::sqrt(squared));
             // No point of the box is farther than this.
             let slack = x.slack * (distance + 2.0 * radius);
             let (below, straddles) = (height + reach < -slack, !(height - reach > slack));
-            let culled = below | (away & (tangents[i] != WIDE)) | (energies[i] == 0);
+            let energy = wide(energies[i]);
+            let culled = below | away | (energy == 0.0);
             let side = f32::from_bits(normal.dot(to_mean).to_bits() & x.cosine_bits);
             let receiver = at_least(clamped_mean(side, RECEIVER_SHARE * variance), x.least_cosine * distance);
-            let facing = f32::from_bits((-length * axis.dot(to_mean)).to_bits() & !(bits & TWO_SIDED));
-            let spread = NORMAL_SHARE * (1.0 - length * length) * squared + EMITTER_SHARE * variance;
+            let facing = length * (-1.0 / (255.0 * NORMAL_STEPS)) * axis.dot(to_mean);
+            let facing = f32::from_bits(facing.to_bits() & !(bits & TWO_SIDED));
+            let loss = NORMAL_SHARE - length * length * (NORMAL_SHARE / (255.0 * 255.0));
+            let spread = loss * squared + EMITTER_SHARE * variance;
             let emitter = at_least(clamped_mean(facing, spread), LEAST_COSINE * distance);
             let term = (receiver * inverse2) * emitter * inverse2;
 
-            let energy = wide(energies[i]);
             weights[i] = only_if(!culled, within_range(energy * term));
             largest = largest.max(weights[i].to_bits());
             doubtful |= u32::from((straddles | (facing < EDGE * distance)) & !culled) << i;
         }
-        let leaves = (1u32 << self.width).wrapping_sub(1 << self.node_count);
+        let leaves = self.children() & (u32::MAX << self.node_count);
         Estimates { weights, largest, doubtful: doubtful & leaves }
     }
 }

@@ -23,7 +23,7 @@ mod validate;
 
 pub(crate) use beam::{Beam, Outgoing};
 pub(crate) use build::build;
-pub(crate) use descend::Walk;
+pub(crate) use descend::{TURNS, Walk};
 pub(crate) use importance::Scene;
 pub(crate) use node::{MAX_LEAVES, Tlas, TlasView};
 pub(crate) use progress::Report;

@@ -106,10 +106,22 @@ impl<const N: usize> Node<N> {
         }
     }
 
+    /// The lanes that refer to anything, as a set of bits.
+    #[inline(always)]
+    pub(super) fn children(&self) -> u32 {
+        (1 << self.width) - 1
+    }
+
     /// A component of a lane's normal.
     #[inline(always)]
     pub(super) fn component(normal: u32, axis: u32) -> f32 {
-        ((normal << (22 - 10 * axis)).cast_signed() >> 22) as f32 * (1.0 / NORMAL_STEPS)
+        Self::steps(normal, axis) * (1.0 / NORMAL_STEPS)
+    }
+
+    /// The same in units of [`NORMAL_STEPS`].
+    #[inline(always)]
+    pub(super) fn steps(normal: u32, axis: u32) -> f32 {
+        ((normal << (22 - 10 * axis)).cast_signed() >> 22) as f32
     }
 
     /// Energies that do not depend on the direction, and those of portals.
@@ -141,6 +153,22 @@ impl<const N: usize> Node<N> {
 
     pub(super) fn is_two_sided(&self, lane: usize) -> bool {
         self.normals[lane] & TWO_SIDED != 0
+    }
+
+    /// The least and largest coordinates of all boxes, by axis: those of [`Self::aabb`].
+    #[inline(always)]
+    pub(super) fn corners(&self) -> ([[f32; N]; 3], [[f32; N]; 3]) {
+        let (origin, steps, centers, halves) = (self.origin, self.steps, self.centers, self.halves);
+        let (mut low, mut high) = ([[0.0; N]; 3], [[0.0; N]; 3]);
+        for axis in 0..3 {
+            let half_step = 0.5 * wide(steps[axis]);
+            for lane in 0..N {
+                let (middle, half) = (2.0 * f32::from(centers[axis][lane]), f32::from(halves[axis][lane]));
+                low[axis][lane] = origin[axis] + (middle - half) * half_step;
+                high[axis][lane] = origin[axis] + (middle + half) * half_step;
+            }
+        }
+        (low, high)
     }
 
     /// The corners of one box. Each is rounded once, so that it still holds what it was made for.

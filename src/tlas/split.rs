@@ -86,7 +86,7 @@ impl<const N: usize> TlasView<'_, N> {
     /// Expected number of times that [`Self::sample_split`] visits a leaf.
     pub(crate) fn expected_count(&self, leaf: u32, x: &ShadingPoint, scene: &impl Scene, splitting: &Splitting) -> f64 {
         if self.nodes.is_empty() {
-            return self.pmf(leaf, x, scene);
+            return self.pmf(leaf, x, scene, None);
         }
         let measure = self.measure(x, splitting);
         let height = self.path(leaf).count() as u32;

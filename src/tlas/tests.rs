@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::descend::{Draw, Follow, Walk};
 use super::node::{Child, TlasView};
+use super::ray::{Crossed, Met};
 use super::{Scene, Splitting, Tlas};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
@@ -101,7 +102,7 @@ fn probabilities_sum_to_one<const N: usize>(scene: &impl Scene) {
         view.validate().expect("a built tree is valid");
         for i in 0..12 {
             let x = shading_point(i, &mut pcg);
-            let leaves: f64 = (0..n as u32).map(|leaf| view.pmf(leaf, &x, scene)).sum();
+            let leaves: f64 = (0..n as u32).map(|leaf| view.pmf(leaf, &x, scene, None)).sum();
             let dead = dead_mass(&view, 0, &x, scene);
             assert!((leaves + dead - 1.0).abs() < 1e-9, "{n} lights: {leaves} + {dead}");
         }
@@ -124,8 +125,8 @@ fn a_sample_has_the_probability_of_its_leaf() {
     for i in 0..20_000 {
         let x = shading_point(i, &mut pcg);
         let u = pcg.next_f32();
-        if let Some((leaf, pmf)) = view.sample(&x, &Odd, Variate::new(u, seed(&[u]))) {
-            let again = view.pmf(leaf, &x, &Odd);
+        if let Some((leaf, pmf)) = view.sample(&x, &Odd, None, Variate::new(u, seed(&[u]))) {
+            let again = view.pmf(leaf, &x, &Odd, None);
             assert!((pmf / again - 1.0).abs() < 1e-12, "leaf {leaf}: {pmf} {again}");
         }
     }
@@ -156,12 +157,21 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let u = pcg.next_f32();
         let draw = |level: Level| {
             let drawn = level.run(Draw { tlas, walk: Walk::new(x, &Odd, Variate::new(u, seed(&[u]))) });
-            let pmf = drawn.map(|(leaf, _)| level.run(Follow { tlas, leaf, x, scene: &Odd }).to_bits());
+            let pmf = drawn.map(|(leaf, _)| level.run(Follow { tlas, leaf, x, scene: &Odd, first: None }).to_bits());
             (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), pmf)
         };
         let mut all = Level::all().map(draw);
         let first = all.next();
         found += usize::from(first.is_some_and(|(drawn, ..)| drawn.is_some()));
+        assert!(all.all(|other| Some(other) == first));
+        let (node, origin, axis) = (&tlas.nodes[i % tlas.nodes.len()], x.position, pcg.direction());
+        let inverse = axis.recip();
+        let lanes = |level: Level| {
+            let crossed = level.run(Crossed { node, origin, inverse });
+            (crossed, level.run(Met { node, origin, axis, cone: [0.6, 0.8] }))
+        };
+        let mut all = Level::all().map(lanes);
+        let first = all.next();
         assert!(all.all(|other| Some(other) == first));
     }
     assert!(found > 2000, "{found} drawn");
@@ -276,7 +286,7 @@ fn without_splitting_there_is_one_visit_like_a_plain_sample() {
             let visits = visits(&tlas, &x, pcg.next_f32(), &splitting);
             assert!(visits.len() <= 1);
             for (leaf, count) in visits {
-                assert!((count / tlas.view().pmf(leaf, &x, &Odd) - 1.0).abs() < 1e-12);
+                assert!((count / tlas.view().pmf(leaf, &x, &Odd, None) - 1.0).abs() < 1e-12);
             }
         }
     }
@@ -296,7 +306,7 @@ fn broken_trees_are_refused() {
             Err(_) => refused += 1,
             Ok(()) => {
                 let x = shading_point(word, &mut pcg);
-                broken.view().sample(&x, &Open, Variate::new(pcg.next_f32(), 1));
+                broken.view().sample(&x, &Open, None, Variate::new(pcg.next_f32(), 1));
                 broken.view().cross(x.position, Vec3::ONE, |_| ());
             }
         }

@@ -110,13 +110,9 @@ pub(crate) fn pick_wide<const N: usize>(weights: &[f32; N], variate: &mut Variat
         return None;
     }
     let target = variate.value() * total;
-    // A value below one leaves the target below the total, so that a weight is found, and never one of zero. By halves:
-    // of as many weights as a power of two.
-    let (mut chosen, mut half) = (0, N / 2);
-    while half > 0 {
-        chosen += if target >= ends[chosen + half - 1] { half } else { 0 };
-        half /= 2;
-    }
+    // A value below one leaves the target below the total, so that a weight is found, and never one of zero. Counted:
+    // a search by halves would wait for each of its steps.
+    let chosen = ends[..N - 1].iter().map(|&end| u32::from(target >= end)).sum::<u32>() as usize;
     // The end before, or zero: products with 0 and 1 are exact.
     let low = ends[chosen.saturating_sub(1)] * f64::from(u8::from(chosen > 0));
     let width = f64::from(weights[chosen]);

@@ -1,22 +1,23 @@
 //! The crate itself.
 
-use ::fanlight::{Hit, Illumination, LightSample, LightSampler, Mesh, ShadingPoint, Weight};
+use ::fanlight::{Hit, Illumination, LightSample, LightSampler, LightSamplerBuilder, Mesh, ShadingPoint, Weight};
 
 use super::{Drawn, Method};
 use crate::scenes::sky::environment;
 use crate::scenes::{Scene, Weight as SceneWeight};
 
-pub(crate) struct Fanlight<'a> {
+/// `N` is the arity of the tree over triangles.
+pub(crate) struct Fanlight<'a, const N: usize = 8> {
     scene: &'a Scene,
-    sampler: LightSampler,
+    sampler: LightSampler<N>,
     /// Whether a ray can cross several portals, so that the density of a point is not that of its direction.
     layered: bool,
 }
 
-impl<'a> Fanlight<'a> {
+impl<'a, const N: usize> Fanlight<'a, N> {
     /// The crate with its defaults, or with another term inside of triangles.
     pub(crate) fn new(scene: &'a Scene, illumination: Option<Illumination>) -> Self {
-        let mut builder = LightSampler::builder();
+        let mut builder = LightSamplerBuilder::new();
         if let Some(illumination) = illumination {
             builder.illumination(illumination);
         }
@@ -39,8 +40,8 @@ impl<'a> Fanlight<'a> {
     }
 }
 
-impl Fanlight<'_> {
-    pub(crate) fn sampler(&self) -> &LightSampler {
+impl<const N: usize> Fanlight<'_, N> {
+    pub(crate) fn sampler(&self) -> &LightSampler<N> {
         &self.sampler
     }
 
@@ -57,7 +58,7 @@ impl Fanlight<'_> {
     }
 }
 
-impl Method for Fanlight<'_> {
+impl<const N: usize> Method for Fanlight<'_, N> {
     #[inline]
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
         let sample = self.sampler.sample(x, u)?;

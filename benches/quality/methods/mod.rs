@@ -70,6 +70,9 @@ pub(crate) trait Method: Sync {
     }
 }
 
+/// Other arities of the tree over triangles than the default, run on any workload if they are named.
+pub(crate) const ARITIES: [&str; 3] = ["fanlight-4", "fanlight-8", "fanlight-16"];
+
 /// Methods that are run on a workload, or a variant of it, by default.
 pub(crate) fn names(workload: &str) -> &'static [&'static str] {
     match workload {
@@ -126,9 +129,12 @@ pub(crate) fn names(workload: &str) -> &'static [&'static str] {
 
 /// Builds the data that a method needs for a scene.
 pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
-    let talk = |illumination| Box::new(Fanlight::new(scene, Some(illumination)));
+    let talk = |illumination| Box::new(<Fanlight>::new(scene, Some(illumination)));
     match name {
-        "fanlight" => Box::new(Fanlight::new(scene, None)),
+        "fanlight" => Box::new(<Fanlight>::new(scene, None)),
+        "fanlight-4" => Box::new(Fanlight::<4>::new(scene, None)),
+        "fanlight-8" => Box::new(Fanlight::<8>::new(scene, None)),
+        "fanlight-16" => Box::new(Fanlight::<16>::new(scene, None)),
         "talk-conservative" => talk(Illumination::Conservative),
         "talk-point-to-point" => talk(Illumination::PointToPoint),
         "talk-boundary" => talk(Illumination::Boundary),
