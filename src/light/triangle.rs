@@ -16,6 +16,9 @@ pub(crate) const POSITION_LIMIT: f32 = 1e9;
 /// Largest coordinate of a shading point that anything arrives at: squares of distances must not overflow.
 const FAR: f32 = 1e15;
 
+/// A triangle is close if its squared radius is more than so many times the squared distance from its plane.
+const CLOSE: f32 = 256.0;
+
 /// What is kept of every triangle that can send light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -155,6 +158,11 @@ impl<'a> Lit<'a> {
             illumination,
             environment: environment.filter(|_| light.is_portal()),
         })
+    }
+
+    /// Whether the shading point is almost on the triangle's plane.
+    pub(crate) fn is_close(&self) -> bool {
+        self.radius2 > CLOSE * self.height * self.height
     }
 
     /// A point of the triangle relative to the shading point. In double precision, as the point may be much nearer

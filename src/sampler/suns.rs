@@ -71,6 +71,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
                 return;
             }
             let Some(lit) = self.lit(leaf, x) else { return };
+            pairs.note(lit.is_close());
             self.sunlit(&lit, sun).visit(self.cells, light.root, &mut |part, through| {
                 if pairs.len() < end {
                     pairs.push(leaf, sun, part, through * scale * cosine);

@@ -15,6 +15,10 @@ pub(super) const ANY: u32 = u32::MAX;
 /// Least probability of the trees where they may find anything.
 const LEAST_TREES: f32 = 0.02;
 
+/// The same next to a portal: what is seen through it differs so much from place to place that neither the estimate of
+/// the trees nor their choices are as good there.
+const LEAST_TREES_CLOSE: f32 = 0.2;
+
 /// Largest estimate of an irradiance, so that sums stay finite.
 const BRIGHTEST: f32 = 1e35;
 
@@ -34,6 +38,8 @@ pub(super) struct Pairs {
     /// Irradiance from each.
     weights: [f32; MAX_SEEN],
     count: usize,
+    /// Whether the shading point is close to one of the portals.
+    is_close: bool,
 }
 
 /// How often each technique is used at one shading point.
@@ -58,8 +64,12 @@ pub(super) enum Technique {
 }
 
 impl Pairs {
-    pub(super) const NONE: Self =
-        Self { seen: [Seen { leaf: 0, sun: 0, part: Part::WHOLE }; MAX_SEEN], weights: [0.0; MAX_SEEN], count: 0 };
+    pub(super) const NONE: Self = Self {
+        seen: [Seen { leaf: 0, sun: 0, part: Part::WHOLE }; MAX_SEEN],
+        weights: [0.0; MAX_SEEN],
+        count: 0,
+        is_close: false,
+    };
 
     fn weights(&self) -> &[f32] {
         &self.weights[..self.count]
@@ -75,6 +85,11 @@ impl Pairs {
         self.seen[self.count] = Seen { leaf, sun: sun as u32, part };
         self.weights[self.count] = weight;
         self.count += 1;
+    }
+
+    /// Notes whether the shading point is close to a portal that a sun may be seen through.
+    pub(super) fn note(&mut self, is_close: bool) {
+        self.is_close |= is_close;
     }
 
     /// Replaces all pairs from one on by the sun as such.
@@ -144,7 +159,8 @@ impl Techniques {
             return Self::trees();
         }
         let trees = trees();
-        let rest = if trees > 0.0 { trees.max(LEAST_TREES * suns).min(BRIGHTEST) } else { 0.0 };
+        let least = if pairs.is_close { LEAST_TREES_CLOSE } else { LEAST_TREES };
+        let rest = if trees > 0.0 { trees.max(least * suns).min(BRIGHTEST) } else { 0.0 };
         let total = f64::from(suns) + f64::from(rest);
         Self { pairs: Some(pairs), rest, trees: f64::from(rest) / total, per_weight: 1.0 / total }
     }
