@@ -137,7 +137,7 @@ fn sample_split() {
 
 fn build() {
     let scene = scenes::scene("cloud-10000");
-    let mut builder = Some(LightSamplerBuilder::<8, 4>::new());
+    let mut builder = Some(LightSamplerBuilder::<16, 4>::new());
     builder.iter_mut().for_each(|builder| add(builder, &scene));
     measured(|_| {
         if let Some(builder) = builder.take() {

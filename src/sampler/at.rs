@@ -9,7 +9,7 @@ use crate::record::ShadingPoint;
 /// Every question to a [`LightSampler`] begins with a search for the suns behind the portals. A host that asks more
 /// than one at the same point saves all searches but the first; the answers are the same.
 #[derive(Clone, Copy, Debug)]
-pub struct PointSampler<'a, const N: usize = 8, const M: usize = 4> {
+pub struct PointSampler<'a, const N: usize = 16, const M: usize = 4> {
     pub(super) lights: LightSamplerView<'a, N, M>,
     pub(super) x: ShadingPoint,
     pub(super) techniques: Techniques,

@@ -26,8 +26,9 @@ enum Surface<'a> {
 ///
 /// Everything is checked when it is added; what was accepted can always be sampled. `N` is the arity of the tree
 /// over triangles (4, 8 or 16), `M` that of the trees over textures (4, 16 or 64).
+/// The wider a tree, the better its choices; on machines without AVX, 8 may be faster than the default of 16.
 #[derive(Debug)]
-pub struct LightSamplerBuilder<'a, const N: usize = 8, const M: usize = 4> {
+pub struct LightSamplerBuilder<'a, const N: usize = 16, const M: usize = 4> {
     environment: Option<Environment>,
     illumination: Illumination,
     textures: Vec<Surface<'a>>,

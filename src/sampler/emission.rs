@@ -47,7 +47,7 @@ pub struct EmissionSample {
 ///
 /// Made by [`LightSampler::emission`] in some microseconds; holds about 1.5 KB.
 #[derive(Clone, Debug)]
-pub struct Emission<'a, const N: usize = 8, const M: usize = 4> {
+pub struct Emission<'a, const N: usize = 16, const M: usize = 4> {
     lights: LightSamplerView<'a, N, M>,
     directions: Directions,
     /// Probabilities of a ray that does not depend on the direction, and of one from the environment's image.
