@@ -187,10 +187,10 @@ fn a_small_matrix_holds() {
 #[test]
 #[ignore = "release tier: a minute; cargo test --release --test stress -- --ignored --nocapture table"]
 fn table() {
-    // More points take longer, and resolve more.
-    let points = std::env::var("STRESS_POINTS").map_or(512, |points| points.parse().expect("a number of points"));
-    let whole = Effort { points, samples: 1000, directions: 100, cells: 1500 };
-    let others = Some(Effort { points: 0, samples: 200, directions: 20, cells: 0 });
+    // Several times the work takes as many times as long, and resolves more.
+    let times = std::env::var("STRESS").map_or(1, |times| times.parse().expect("a whole number"));
+    let whole = Effort { points: 128 * times, samples: 500, directions: 50, cells: 300 * times };
+    let others = Some(Effort { points: 0, samples: 100, directions: 10, cells: 0 });
     let plan = Plan { sizes: Sizes { triangles: 1_000_000, sky: 4096 }, whole, others, thin: false };
     let table = run_all(&plan);
     print_all(&table);
