@@ -7,7 +7,9 @@
 mod common;
 
 mod columns;
+mod estimate;
 mod exact;
+mod integral;
 mod matrix;
 mod measure;
 mod numbers;

@@ -2,8 +2,11 @@
 
 use core::fmt::Write;
 
+use fanlight::{Hit, LightSample, TriangleId};
+use glam::Vec3;
+
 use crate::columns;
-use crate::common::lights::build;
+use crate::common::lights::{Point, build};
 use crate::common::parallel;
 use crate::measure::{Effort, Found, describe, measure};
 use crate::rows::{self, Sizes};
@@ -196,4 +199,46 @@ fn table() {
     print_all(&table);
     let missed = missed(&table);
     assert!(missed.is_empty(), "{} of the cells miss a bar:\n{}", missed.len(), missed.join("\n"));
+}
+
+/// A density that is too large by a tenth on a part of each triangle, of samples, too.
+struct Wrong<'a>(Box<dyn Point + 'a>);
+
+impl Wrong<'_> {
+    fn factor(barycentrics: [f32; 2]) -> f32 {
+        if barycentrics[0] > 0.5 { 1.1 } else { 1.0 }
+    }
+}
+
+impl Point for Wrong<'_> {
+    fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
+        self.0.sample(u).map(|s| LightSample { pdf: Self::factor(s.hit.barycentrics) * s.pdf, ..s })
+    }
+
+    fn pdf(&self, hit: &Hit) -> f32 {
+        Self::factor(hit.barycentrics) * self.0.pdf(hit)
+    }
+
+    fn pmf(&self, triangle: TriangleId) -> f32 {
+        self.0.pmf(triangle)
+    }
+
+    fn pdf_direction(&self, direction: Vec3) -> f32 {
+        self.0.pdf_direction(direction)
+    }
+
+    fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
+        self.0.pdf_sample_direction(sample).max(sample.pdf)
+    }
+}
+
+#[test]
+fn a_wrong_density_misses_all_bars() {
+    let row = rows::row(8, Sizes { triangles: 100, sky: 16 });
+    let lights = build(&row.scene, ARITIES[0]);
+    let x = columns::point(&row.scene, columns::NAMES.len() - 1, 2);
+    let effort = Effort { points: 1024, samples: 300, directions: 100, cells: 300 };
+    assert!(measure(&row, &*lights.at(&x), &x, effort, 1).misses().is_empty());
+    let found = measure(&row, &Wrong(lights.at(&x)), &x, effort, 1);
+    assert_eq!(found.misses(), ["normalisation", "agreement", "irradiance"], "{found:?}");
 }
