@@ -121,6 +121,10 @@ impl Walk<'_, '_> {
                 if high - low > 1e-4 * high {
                     self.unresolved += share * (high - low);
                     if self.on.most < usize::MAX {
+                        // Samples that fell where the random places may miss what they show.
+                        if !probes.is_empty() {
+                            self.variance += (0.25 * share * (high - low)).powi(2);
+                        }
                         self.bins[bin] += share * self.at_random(quarters, share);
                         return;
                     }
