@@ -131,47 +131,56 @@ mod tests {
     use super::*;
     use crate::testing::{Pcg32, chi_square_limit};
 
-    /// Sum over 60 levels of the chi-square of a choice between two halves.
-    fn chi_square_of_depth_60(mut choose: impl FnMut(f32, &mut [u32; 60])) -> f64 {
+    /// Levels of choices, far more than any tree has.
+    const DEPTH: usize = 200;
+
+    /// The first level at which a choice of probability `share`, or the same choice at this level and the one before,
+    /// is made too often or too seldom (chi-square of one degree above 30, which chance exceeds once in 20 million).
+    fn first_wrong_level(share: f64, mut choose: impl FnMut(f32, &mut [bool; DEPTH])) -> Option<usize> {
         let count = 100_000;
         let mut pcg = Pcg32::new(1, 1);
-        let mut taken = [0; 60];
+        let (mut single, mut double) = ([0; DEPTH], [0; DEPTH]);
+        let mut taken = [false; DEPTH];
         for _ in 0..count {
             choose(pcg.next_f32(), &mut taken);
+            for level in 0..DEPTH {
+                single[level] += u32::from(taken[level]);
+                double[level] += u32::from(level > 0 && taken[level] && taken[level - 1]);
+            }
         }
-        let n = f64::from(count);
-        taken.iter().map(|&t| (f64::from(t) - 0.5 * n).powi(2) / (n * 0.25)).sum()
+        let is_wrong = |taken: u32, share: f64| {
+            let n = f64::from(count);
+            (f64::from(taken) - share * n).powi(2) / (n * share * (1.0 - share)) > 30.0
+        };
+        (0..DEPTH).find(|&i| is_wrong(single[i], share) || i > 0 && is_wrong(double[i], share * share))
     }
 
     #[test]
-    fn sixty_choices_are_unbiased() {
-        let variate = chi_square_of_depth_60(|u, taken| {
-            let mut v = Variate::new(u, seed(&[u]));
-            for t in taken {
-                if v.value() < 0.5 {
-                    v.rescale(0.0, 0.5);
-                } else {
-                    *t += 1;
-                    v.rescale(0.5, 0.5);
+    fn choices_are_unbiased_at_any_depth() {
+        for share in [0.5, 0.3, 0.99] {
+            let wrong = first_wrong_level(share, |u, taken| {
+                let mut v = Variate::new(u, seed(&[u]));
+                for taken in taken {
+                    *taken = v.value() < share;
+                    if *taken { v.rescale(0.0, share) } else { v.rescale(share, 1.0 - share) }
                 }
-            }
-        });
-        assert!(variate < chi_square_limit(60), "{variate}");
+            });
+            assert_eq!(wrong, None, "choices of {share}");
+        }
     }
 
+    /// A float has 24 bits, of which each choice between halves takes one. (Uneven choices replace them by the noise of
+    /// rounding, so that single levels do not show how few different ways there are.)
     #[test]
-    fn the_same_test_rejects_a_rescaled_float() {
-        let naive = chi_square_of_depth_60(|mut v, taken| {
-            for t in taken {
-                if v < 0.5 {
-                    v *= 2.0;
-                } else {
-                    *t += 1;
-                    v = (v - 0.5) * 2.0;
-                }
+    fn a_rescaled_float_is_used_up_after_24_choices() {
+        let wrong = first_wrong_level(0.5, |mut v, taken| {
+            for taken in taken {
+                *taken = v < 0.5;
+                v = if *taken { 2.0 * v } else { 2.0 * v - 1.0 };
             }
         });
-        assert!(naive > 10.0 * chi_square_limit(60), "{naive}");
+        std::println!("a float that is rescaled by choices between halves fails at level {wrong:?}");
+        assert_eq!(wrong, Some(24));
     }
 
     #[test]

@@ -4,10 +4,15 @@
 use fanlight::{Hit, LightSample, ShadingPoint, TriangleId};
 use glam::DVec3;
 
+use super::pcg::Pcg32;
 use super::scene::Scene;
 
-/// Cells are not divided further. What is left is the difference between neighbours over 4^-13 of a triangle.
+/// Cells are not divided further, unless a test asks for it. What is left is the difference between neighbours over
+/// 4^-13 of a triangle.
 const DEEPEST: u32 = 13;
+
+/// Barycentric coordinates that every density is exact for are multiples of this.
+const STEP: f64 = 1.0 / (1 << 24) as f64;
 
 pub(crate) fn id((mesh, triangle): (usize, usize)) -> TriangleId {
     TriangleId { mesh: mesh as u32, triangle: triangle as u32 }
@@ -22,6 +27,8 @@ pub(crate) struct OnTriangle<'a> {
     vertices: [DVec3; 3],
     /// Times the triangle's area, over the distance cubed: from solid angle to the unit of the triangle.
     height_area: f64,
+    deepest: u32,
+    most: usize,
     pdf: &'a dyn Fn(&Hit) -> f64,
 }
 
@@ -32,12 +39,19 @@ impl<'a> OnTriangle<'a> {
         let [a, b, c] = vertices;
         // |n·a| / |n| · |n| / 2.
         let height_area = 0.5 * (b - a).cross(c - a).dot(a).abs();
-        Self { id: id(triangle), vertices, height_area, pdf }
+        Self { id: id(triangle), vertices, height_area, deepest: DEEPEST, most: usize::MAX, pdf }
+    }
+
+    /// Divides cells so often if need be, but not more than so many of them. What is left undivided is looked at in
+    /// random places, and what [`Self::integrate`] says of it is a standard error.
+    pub(crate) fn limits(self, deepest: u32, most: usize) -> Self {
+        Self { deepest, most, ..self }
     }
 
     /// Density in units of one over the triangle's area.
     fn density(&self, b: [f64; 2]) -> f64 {
-        let barycentrics = b.map(|b| b as f32);
+        // Next to the shading point, rounding would be felt.
+        let barycentrics = b.map(|b| ((b / STEP).round() * STEP) as f32);
         let pdf = (self.pdf)(&Hit { triangle: self.id, barycentrics });
         if pdf == 0.0 {
             return 0.0;
@@ -56,10 +70,19 @@ impl<'a> OnTriangle<'a> {
         let mut bins = vec![0.0; 1 << (2 * bin_depth)];
         let probes = probes.iter().map(|b| (b.map(f64::from), self.density(b.map(f64::from)))).collect();
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-        let mut walk =
-            Walk { on: self, bins: &mut bins, bin_depth, least_depth: least_depth.max(bin_depth), unresolved: 0.0 };
+        let pcg = Pcg32::new(self.id.triangle.into(), 63);
+        let mut walk = Walk {
+            pcg,
+            on: self,
+            bins: &mut bins,
+            bin_depth,
+            least_depth: least_depth.max(bin_depth),
+            divided: 0,
+            unresolved: 0.0,
+            variance: 0.0,
+        };
         walk.visit(corners, 0, 0, probes);
-        let unresolved = walk.unresolved;
+        let unresolved = if self.most == usize::MAX { walk.unresolved } else { walk.variance.sqrt() };
         (bins, unresolved)
     }
 }
@@ -69,7 +92,10 @@ struct Walk<'a, 'b> {
     bins: &'a mut [f64],
     bin_depth: u32,
     least_depth: u32,
+    divided: usize,
     unresolved: f64,
+    variance: f64,
+    pcg: Pcg32,
 }
 
 impl Walk<'_, '_> {
@@ -83,17 +109,31 @@ impl Walk<'_, '_> {
                 let of_quarter = |q| (0..4).map(move |i| middle(quarter(q, i)));
                 parts.extend(quarters.into_iter().flat_map(of_quarter).map(|b| self.on.density(b)));
             }
+            // A horizon may leave no more than a tip of a cell.
+            if self.on.most < usize::MAX && values.iter().all(|v| (v - values[0]).abs() <= 1e-4 * v) {
+                let tips = (0..3).map(|k| self.on.density(tip(corners, k)));
+                parts.extend(tips);
+            }
             let all = || values.iter().chain(&parts).copied().chain(probes.iter().map(|p| p.1));
             let (low, high) = all().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
-            if high - low <= 1e-4 * high || depth >= DEEPEST {
+            if high - low <= 1e-4 * high || depth >= self.on.deepest || self.divided >= self.on.most {
                 let share = 0.25f64.powi(depth as i32);
                 if high - low > 1e-4 * high {
                     self.unresolved += share * (high - low);
+                    if self.on.most < usize::MAX {
+                        // Samples that fell where the random places may miss what they show.
+                        if !probes.is_empty() {
+                            self.variance += (0.25 * share * (high - low)).powi(2);
+                        }
+                        self.bins[bin] += share * self.at_random(quarters, share);
+                        return;
+                    }
                 }
                 self.bins[bin] += share * values.iter().sum::<f64>() / 4.0;
                 return;
             }
         }
+        self.divided += 1;
         let mut parts: [Vec<([f64; 2], f64)>; 4] = Default::default();
         for (b, value) in probes {
             let (i, local) = step(b);
@@ -106,8 +146,32 @@ impl Walk<'_, '_> {
     }
 }
 
+impl Walk<'_, '_> {
+    /// Mean over random places, two in each quarter of a cell of this share.
+    fn at_random(&mut self, quarters: [[[f64; 2]; 3]; 4], share: f64) -> f64 {
+        let mut sum = 0.0;
+        for [a, b, c] in quarters {
+            let [first, second] = [(); 2].map(|()| {
+                let [u, v] = [self.pcg.f32(), self.pcg.f32()].map(f64::from);
+                let [s, t] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+                self.on.density(core::array::from_fn(|i| a[i] + (b[i] - a[i]) * s + (c[i] - a[i]) * t))
+            });
+            sum += first + second;
+            // Of the mean of the two, with the share of a quarter.
+            self.variance += (share * (first - second)).powi(2) / 64.0;
+        }
+        sum / 8.0
+    }
+}
+
 fn middle([a, b, c]: [[f64; 2]; 3]) -> [f64; 2] {
     core::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0)
+}
+
+/// A point near one of the corners.
+fn tip(corners: [[f64; 2]; 3], k: usize) -> [f64; 2] {
+    let middle = middle(corners);
+    core::array::from_fn(|i| corners[k][i] + 0.06 * (middle[i] - corners[k][i]))
 }
 
 /// One of the four similar parts of a barycentric triangle. The last one is the inverted one in the middle.

@@ -1,6 +1,6 @@
 //! Samplers of all arities behind one face.
 
-use fanlight::{Hit, LightSample, LightSampler, LightSamplerView, ShadingPoint, Splitting, TriangleId};
+use fanlight::{Hit, LightSample, LightSampler, LightSamplerView, PointSampler, ShadingPoint, Splitting, TriangleId};
 use glam::Vec3;
 use smallvec::SmallVec;
 
@@ -8,6 +8,7 @@ use super::scene::Scene;
 
 /// The calls that the tests make, of any arities.
 pub(crate) trait Lights: Sync {
+    fn at<'a>(&'a self, x: &ShadingPoint) -> Box<dyn Point + 'a>;
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<LightSample>;
     fn pdf(&self, x: &ShadingPoint, hit: &Hit) -> f32;
     fn pmf(&self, x: &ShadingPoint, triangle: TriangleId) -> f32;
@@ -22,6 +23,10 @@ pub(crate) trait Lights: Sync {
 }
 
 impl<const N: usize, const M: usize> Lights for LightSampler<N, M> {
+    fn at<'a>(&'a self, x: &ShadingPoint) -> Box<dyn Point + 'a> {
+        Box::new(LightSampler::at(self, x))
+    }
+
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<LightSample> {
         LightSampler::sample(self, x, u)
     }
@@ -66,6 +71,37 @@ impl<const N: usize, const M: usize> Lights for LightSampler<N, M> {
         let mut samples = vec![None; points.len()];
         view.sample_many(points, &mut samples);
         samples
+    }
+}
+
+/// The calls at one shading point.
+pub(crate) trait Point {
+    fn sample(&self, u: [f32; 3]) -> Option<LightSample>;
+    fn pdf(&self, hit: &Hit) -> f32;
+    fn pmf(&self, triangle: TriangleId) -> f32;
+    fn pdf_direction(&self, direction: Vec3) -> f32;
+    fn pdf_sample_direction(&self, sample: &LightSample) -> f32;
+}
+
+impl<const N: usize, const M: usize> Point for PointSampler<'_, N, M> {
+    fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
+        PointSampler::sample(self, u)
+    }
+
+    fn pdf(&self, hit: &Hit) -> f32 {
+        PointSampler::pdf(self, hit)
+    }
+
+    fn pmf(&self, triangle: TriangleId) -> f32 {
+        PointSampler::pmf(self, triangle)
+    }
+
+    fn pdf_direction(&self, direction: Vec3) -> f32 {
+        PointSampler::pdf_direction(self, direction)
+    }
+
+    fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
+        PointSampler::pdf_sample_direction(self, sample)
     }
 }
 

@@ -28,7 +28,7 @@ fn wrapped(wrap: Wrap, index: i64, n: usize) -> usize {
     index as usize
 }
 
-fn look_up(image: &Image, uv: DVec2) -> f64 {
+pub(crate) fn look_up(image: &Image, uv: DVec2) -> f64 {
     let [w, h] = image.size;
     let fetch =
         |i: i64, j: i64| f64::from(image.texels[wrapped(image.wrap[1], j, h) * w + wrapped(image.wrap[0], i, w)]);
@@ -72,7 +72,7 @@ pub(crate) fn radiance(scene: &Scene, direction: DVec3) -> f64 {
 }
 
 /// Where a ray from the origin crosses a triangle with these vertices.
-fn intersect([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<[f64; 2]> {
+pub(crate) fn intersect([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<[f64; 2]> {
     let normal = (b - a).cross(c - a);
     let t = normal.dot(a) / normal.dot(direction);
     if !(t > 0.0 && t.is_finite()) {
@@ -87,11 +87,11 @@ fn intersect([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<[f64; 2]> {
 }
 
 /// Whether light leaves a triangle, at this place relative to the shading point, towards it.
-fn sends([a, b, c]: [DVec3; 3], mesh: &LightMesh) -> bool {
+pub(crate) fn sends([a, b, c]: [DVec3; 3], mesh: &LightMesh) -> bool {
     mesh.two_sided || (b - a).cross(c - a).dot(a) < 0.0
 }
 
-fn relative(mesh: &LightMesh, triangle: usize, x: &ShadingPoint) -> [DVec3; 3] {
+pub(crate) fn relative(mesh: &LightMesh, triangle: usize, x: &ShadingPoint) -> [DVec3; 3] {
     mesh.vertices(triangle).map(|v| v.as_dvec3() - x.position.as_dvec3())
 }
 

@@ -1,0 +1,67 @@
+//! The shading points of the matrix: places around one triangle.
+
+use fanlight::{Receiver, ShadingPoint};
+use glam::DVec3;
+
+use crate::common::scene::Scene;
+
+pub(crate) const NAMES: [&str; 9] = [
+    "far",
+    "near, 1e-3",
+    "near, 1e-7",
+    "on the triangle",
+    "on its edge",
+    "at its vertex",
+    "in its plane",
+    "behind",
+    "grazing",
+];
+
+/// Sines of the angle by which a tip of the triangle rises above the horizon of the last column.
+const GRAZING: f64 = 0.05;
+
+/// The point of a column with one kind of receiver: 0 surface, 1 transmissive, 2 volume.
+pub(crate) fn point(scene: &Scene, column: usize, receiver: usize) -> ShadingPoint {
+    let [a, b, c] = scene.meshes[0].vertices(0).map(|v| v.as_dvec3());
+    let size = (b - a).length().max((c - a).length());
+    let front = (b - a).cross(c - a).normalize();
+    let centroid = (a + b + c) / 3.0;
+    let inside = 0.3 * a + 0.36 * b + 0.34 * c;
+    let position = match column {
+        0 => centroid + (1e5 * size) * (front + 0.1 * (b - a) / size),
+        1 => inside + 1e-3 * size * front,
+        2 => inside + 1e-7 * size * front,
+        3 => inside,
+        4 => 0.5 * (b + c),
+        5 => c,
+        6 => a + 0.7 * (c - a) + 0.7 * (b - a),
+        7 => centroid - 0.7 * size * front,
+        _ => centroid + 0.5 * size * front,
+    };
+    let normal = match column {
+        0 => -front,
+        7 => front,
+        8 => grazing(c - position, centroid - position),
+        _ => (-front + 0.5 * (a - c) / (a - c).length() + 0.3 * front.cross(a - c) / (a - c).length()).normalize(),
+    }
+    .as_vec3()
+    .normalize();
+    let receiver = [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][receiver];
+    ShadingPoint { position: position.as_vec3(), receiver }
+}
+
+/// A normal over whose horizon a tip rises, but not the centre.
+fn grazing(tip: DVec3, centre: DVec3) -> DVec3 {
+    let tip = tip.normalize();
+    let away = (centre - tip * tip.dot(centre)).normalize();
+    (GRAZING * tip - away).normalize()
+}
+
+/// A name for messages.
+pub(crate) fn receiver_name(x: &ShadingPoint) -> &'static str {
+    match x.receiver {
+        Receiver::Surface(_) => "surface",
+        Receiver::Transmissive(_) => "transmissive",
+        Receiver::Volume => "volume",
+    }
+}
