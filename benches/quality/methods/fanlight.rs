@@ -6,8 +6,8 @@ use super::{Drawn, Method};
 use crate::scenes::sky::environment;
 use crate::scenes::{Scene, Weight as SceneWeight};
 
-/// `N` is the arity of the tree over triangles.
-pub(crate) struct Fanlight<'a, const N: usize = 8> {
+/// `N` is the arity of the tree over triangles, by default that of the crate.
+pub(crate) struct Fanlight<'a, const N: usize = 16> {
     scene: &'a Scene,
     sampler: LightSampler<N>,
     /// Whether a ray can cross several portals, so that the density of a point is not that of its direction.
