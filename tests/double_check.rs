@@ -28,6 +28,8 @@ const TOLERANCE: f64 = 1e-5;
 /// Shading points of a scene, and samples of each.
 const POINTS: usize = 50;
 const SAMPLES: usize = 2000;
+/// Scenes after which it says how far it has come.
+const BLOCK: usize = 200;
 /// Mismatches of which the log tells.
 const LOGGED: usize = 1000;
 
@@ -113,13 +115,21 @@ fn all_samples_have_the_density_that_pdf_finds() {
     let scenes = (samples / (POINTS * SAMPLES) as f64).ceil() as usize;
     let clock = Instant::now();
     let mut all = Counts::default();
-    parallel::map(scenes, examine).into_iter().for_each(|counts| all.add(counts));
-    let seconds = clock.elapsed().as_secs_f64();
-    let summary = format!(
-        "{} samples of {scenes} scenes, {} of them None: {} mismatches above {TOLERANCE:e}, worst difference {:.1e}, {seconds:.0} s",
-        all.samples, all.none, all.mismatches, all.worst
-    );
-    println!("{summary}");
+    let mut summary = String::new();
+    for start in (0..scenes).step_by(BLOCK) {
+        let count = BLOCK.min(scenes - start);
+        parallel::map(count, |i| examine(start + i)).into_iter().for_each(|counts| all.add(counts));
+        summary = format!(
+            "{} samples of {} scenes, {} of them None: {} mismatches above {TOLERANCE:e}, worst difference {:.1e}, {:.0} s",
+            all.samples,
+            start + count,
+            all.none,
+            all.mismatches,
+            all.worst,
+            clock.elapsed().as_secs_f64()
+        );
+        println!("{summary}");
+    }
     let mut text = summary;
     all.log.iter().for_each(|line| write!(text, "\n{line}").expect("a string can grow"));
     let log = Path::new(env!("CARGO_TARGET_TMPDIR")).join("double_check.log");
