@@ -4,7 +4,7 @@
 mod common;
 
 use common::hostile::{MOVED, hostile, random_scene, shading_point};
-use common::lights::{ARITIES, Lights, build};
+use common::lights::{ARITIES, Point, build};
 use common::parallel;
 use common::pcg::Pcg32;
 use common::scene::{Content, LightMesh, Paint, Scene, random_point};
@@ -51,9 +51,9 @@ impl Counts {
         self.first = self.first.take().or(other.first);
     }
 
-    fn check(&mut self, lights: &dyn Lights, x: &ShadingPoint, sample: &LightSample) {
+    fn check(&mut self, at: &dyn Point, x: &ShadingPoint, sample: &LightSample) {
         self.samples += 1;
-        let pdf = lights.pdf(x, &sample.hit);
+        let pdf = at.pdf(&sample.hit);
         let difference = (f64::from(pdf) / f64::from(sample.pdf) - 1.0).abs();
         self.worst = self.worst.max(difference);
         if differs(pdf, sample.pdf, TOLERANCE) {
@@ -70,18 +70,18 @@ impl Counts {
         }
     }
 
-    fn check_direction(&mut self, lights: &dyn Lights, x: &ShadingPoint, sample: &LightSample) {
+    fn check_direction(&mut self, at: &dyn Point, x: &ShadingPoint, sample: &LightSample) {
         self.directions += 1;
-        if differs(lights.pmf(x, sample.hit.triangle), sample.pmf, TOLERANCE) {
+        if differs(at.pmf(sample.hit.triangle), sample.pmf, TOLERANCE) {
             self.mismatches += 1;
             self.first.get_or_insert_with(|| format!("{sample:?} at {x:?}: pmf"));
         }
-        let along = lights.pdf_sample_direction(x, sample);
+        let along = at.pdf_sample_direction(sample);
         if !(along >= sample.pdf && along.is_finite()) {
             self.below += 1;
             self.first.get_or_insert_with(|| format!("{sample:?} at {x:?}: along the direction {along}"));
         }
-        if differs(lights.pdf_direction(x, sample.direction), along, 1e-2) {
+        if differs(at.pdf_direction(sample.direction), along, 1e-2) {
             self.boundary += 1;
         }
     }
@@ -95,15 +95,16 @@ fn examine(number: usize, samples: usize, every: usize) -> Counts {
     let mut counts = Counts::default();
     for point in 0..POINTS {
         let x = shading_point(number + point, &scene, &mut pcg);
+        let at = lights.at(&x);
         for i in 0..samples / POINTS {
             // A direction leads to the same cell only where the point is not on the rim of one: plain numbers then.
             let direction = i % every == 0 && (number + point) % 10 < 7 && !MOVED.contains(&(number % 8));
             let u = core::array::from_fn(|_| if direction { pcg.f32() } else { hostile(&mut pcg) });
-            match lights.sample(&x, u) {
+            match at.sample(u) {
                 Some(sample) => {
-                    counts.check(&*lights, &x, &sample);
+                    counts.check(&*at, &x, &sample);
                     if direction {
-                        counts.check_direction(&*lights, &x, &sample);
+                        counts.check_direction(&*at, &x, &sample);
                     }
                 }
                 None => {
@@ -154,7 +155,7 @@ fn a_density_of_another_cell_is_told_apart() {
     for _ in 0..1000 {
         let mut sample = lights.sample(&x, pcg.cube()).expect("everything is visible");
         sample.pdf *= 1.0 + 3e-5;
-        counts.check(&*lights, &x, &sample);
+        counts.check(&*lights.at(&x), &x, &sample);
     }
     assert_eq!(counts.mismatches, 1000);
 }
