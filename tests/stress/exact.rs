@@ -54,21 +54,22 @@ pub(crate) fn irradiance(scene: &Scene, x: &ShadingPoint, ones: bool) -> Irradia
     sum
 }
 
-/// Whether a light is so near that what matters of it is only so many steps of its barycentric coordinates wide, which
-/// have 24 bits. `detail` is the angle that its smallest bright part is seen under.
-pub(crate) fn is_beyond(scene: &Scene, x: &ShadingPoint, detail: f64) -> bool {
-    const STEPS: f64 = 16.0 / (1 << 24) as f64;
+/// How many steps of barycentric coordinates, which have 24 bits, what matters of the nearest light is wide. `detail` is
+/// the angle that its smallest bright part is seen under.
+pub(crate) fn steps(scene: &Scene, x: &ShadingPoint, detail: f64) -> f64 {
+    const STEP: f64 = 1.0 / (1 << 24) as f64;
     /// Solid angle of a light that matters.
     const SEEN: f64 = 0.01;
-    scene.triangles().any(|(m, triangle)| {
+    let width = |(m, triangle)| {
         let vertices = oracle::relative(&scene.meshes[m], triangle, x);
         let [a, b, c] = vertices;
         let cross = (b - a).cross(c - a);
         let height = cross.dot(a).abs() / cross.length();
         let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-        let is_near = height > 0.0 && height * detail < STEPS * longest;
-        is_near && oracle::sends(vertices, &scene.meshes[m]) && solid_angle(vertices) > SEEN
-    })
+        let matters = height > 0.0 && oracle::sends(vertices, &scene.meshes[m]) && solid_angle(vertices) > SEEN;
+        if matters { height * detail / (STEP * longest) } else { f64::INFINITY }
+    };
+    scene.triangles().map(width).fold(f64::INFINITY, f64::min)
 }
 
 /// Calls `add` with the radiance of each part of a triangle that shows a single texel.

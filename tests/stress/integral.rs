@@ -8,6 +8,8 @@ use crate::rows::Row;
 
 /// Triangles that together have less probability than this are left out of an integral.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Share of a triangle's probability that may stay in doubt.
+const ENOUGH: f64 = 1e-5;
 /// Halvings of an edge down to which a density can vary.
 const DEEPEST: u32 = 20;
 /// Triangles of a large scene that are integrated over.
@@ -19,10 +21,11 @@ fn over_triangle(
     x: &ShadingPoint,
     triangle: (usize, usize),
     [depth, most]: [usize; 2],
+    enough: f64,
     probes: &[[f32; 2]],
 ) -> (f64, f64) {
     let pdf = |hit: &Hit| f64::from(at.pdf(hit));
-    let on = OnTriangle::new(&row.scene, triangle, x, &pdf).limits(DEEPEST, most);
+    let on = OnTriangle::new(&row.scene, triangle, x, &pdf).limits(DEEPEST, most, enough);
     let (whole, open) = on.integrate(0, depth as u32, probes);
     (whole[0], open)
 }
@@ -46,7 +49,7 @@ pub(crate) fn all(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSamp
         left -= pmf;
         let probes = &probes[triangle.0][triangle.1];
         let divisions = 30 + (cells as f64 * pmf) as usize;
-        let over = |depth: usize| over_triangle(row, at, x, triangle, [depth, divisions], probes);
+        let over = |depth: usize| over_triangle(row, at, x, triangle, [depth, divisions], ENOUGH * pmf, probes);
         let depth = if pmf > 0.05 { 5 } else { 1 };
         // What the first cells do not tell shows where there are more.
         let ((coarse, _), (fine, error)) = (over(depth - 1), over(depth));
@@ -64,7 +67,7 @@ pub(crate) fn some(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSam
     for triangle in &some {
         let triangle = (triangle.mesh as usize, triangle.triangle as usize);
         let pmf = f64::from(at.pmf(id(triangle)));
-        let over = |depth: usize| over_triangle(row, at, x, triangle, [depth, cells], &[]);
+        let over = |depth: usize| over_triangle(row, at, x, triangle, [depth, cells], ENOUGH * pmf, &[]);
         let ((coarse, _), (fine, error)) = (over(2), over(3));
         ratio += fine / pmf;
         variance += (error * error + (fine - coarse) * (fine - coarse)) / (pmf * pmf);

@@ -89,10 +89,11 @@ fn run(number: usize, plan: &Plan) -> (&'static str, Vec<Cell>) {
 impl Found {
     /// What is above its bar by more than chance.
     fn misses(&self) -> Vec<&'static str> {
-        let normalisation = !self.beyond && self.normalisation > NORMALISATION + self.normalisation_resolution;
+        let allowed = |bar: f64, resolution: f64| bar.max(self.rounding) + resolution;
+        let normalisation = !self.beyond && self.normalisation > allowed(NORMALISATION, self.normalisation_resolution);
         let agreement = self.agreement > AGREEMENT;
-        let irradiance =
-            !self.beyond && self.irradiance.is_some_and(|[error, resolution]| error > IRRADIANCE + resolution);
+        let is_off = |[error, resolution]: [f64; 2]| error > allowed(IRRADIANCE, resolution);
+        let irradiance = !self.beyond && self.irradiance.is_some_and(is_off);
         let all = [(normalisation, "normalisation"), (agreement, "agreement"), (irradiance, "irradiance")];
         all.into_iter().filter(|(misses, _)| *misses).map(|(_, name)| name).collect()
     }
@@ -128,9 +129,16 @@ fn worst(cell: &Cell, value: impl Fn(&Found) -> f64) -> f64 {
     cell.found.iter().map(value).fold(0.0, f64::max)
 }
 
-/// Marks what is smaller than barycentric coordinates can tell apart.
+/// Marks what is smaller than barycentric coordinates can tell apart, or not much larger.
 fn mark(cell: &Cell) -> &'static str {
-    if cell.found.iter().any(|found| found.beyond) { " †" } else { "" }
+    let any = |is: &dyn Fn(&Found) -> bool| cell.found.iter().any(is);
+    if any(&|found| found.beyond) {
+        " †"
+    } else if any(&|found| found.rounding > IRRADIANCE) {
+        " ‡"
+    } else {
+        ""
+    }
 }
 
 fn print(title: &str, table: &[(&'static str, Vec<Cell>)], entry: impl Fn(&Cell) -> String) {

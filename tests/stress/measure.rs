@@ -21,6 +21,9 @@ const NOISY: f64 = 20.0;
 /// Samples that bring anything below which their spread tells nothing.
 const RARE: usize = 100;
 
+/// Steps of a barycentric coordinate below which nothing is told apart.
+const TOO_FEW: f64 = 16.0;
+
 /// How much is done.
 #[derive(Clone, Copy)]
 pub(crate) struct Effort {
@@ -50,6 +53,8 @@ pub(crate) struct Found {
     pub(crate) dark: bool,
     /// Whether what counts is smaller than what barycentric coordinates of 24 bits tell apart.
     pub(crate) beyond: bool,
+    /// What of it is lost where its rim is rounded.
+    pub(crate) rounding: f64,
     /// Whether directions from all around helped.
     pub(crate) both: bool,
     pub(crate) samples: usize,
@@ -63,7 +68,8 @@ pub(crate) fn measure(row: &Row, at: &dyn Point, x: &ShadingPoint, effort: Effor
     if effort.points == 0 {
         return found;
     }
-    found.beyond = exact::is_beyond(&row.scene, x, row.detail);
+    let steps = exact::steps(&row.scene, x, row.detail);
+    (found.beyond, found.rounding) = (steps < TOO_FEW, 1.0 / steps);
     let exact = exact::irradiance(&row.scene, x, row.ones);
     found.both = !is_many(row) && relative_variance(row, at, x, &mut pcg) > NOISY;
     let estimate = estimate(row, at, x, effort, &mut pcg, found.both, exact.arriving);
