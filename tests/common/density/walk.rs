@@ -1,7 +1,9 @@
 //! Cells of a triangle, of which those whose integral is most in doubt are divided first.
 
+extern crate alloc;
+
+use alloc::collections::BinaryHeap;
 use core::cmp::Ordering;
-use std::collections::BinaryHeap;
 
 use super::{DEEPEST_DOUBT, OnTriangle, middle, quarter, step, tip};
 use crate::common::pcg::Pcg32;
