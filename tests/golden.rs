@@ -14,9 +14,9 @@ use common::lights::{ARITIES, Lights, build};
 use common::parallel;
 use common::pcg::Pcg32;
 use common::scene::Scene;
-use fanlight::{LightSample, ShadingPoint, Splitting};
+use fanlight::{LightSample, ShadingPoint, Splitting, TriangleId};
 
-const SCENES: usize = 56;
+const SCENES: usize = 70;
 const POINTS: usize = 60;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
@@ -56,7 +56,7 @@ fn ask(lights: &dyn Lights, x: &ShadingPoint, pcg: &mut Pcg32, hash: &mut Hash) 
         hash.add(&[at.pdf(&sample.hit), at.pmf(sample.hit.triangle), lights.pdf_split(x, &sample.hit, &splitting)]);
         hash.add(&[at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
     }
-    hash.add(&[at.pdf_direction(pcg.direction())]);
+    hash.add(&[at.pdf_direction(pcg.direction()), at.pmf(TriangleId { mesh: 0, triangle: 0 })]);
     usize::from(single.is_some()) + split.len()
 }
 
@@ -79,10 +79,12 @@ fn line(number: usize) -> String {
     let lights = build(&scene, (n, m));
     let mut hash = Hash::new();
     let mut drawn = 0;
-    for i in 0..POINTS {
-        let x = shading_point(number + i, &scene, &mut pcg);
-        drawn += ask(&*lights, &x, &mut pcg, &mut hash);
+    let points: Vec<_> = (0..POINTS).map(|i| shading_point(number + i, &scene, &mut pcg)).collect();
+    for x in &points {
+        drawn += ask(&*lights, x, &mut pcg, &mut hash);
     }
+    let queries: Vec<_> = points.iter().map(|x| (*x, pcg.cube())).collect();
+    lights.sample_from_bytes(&queries).iter().flatten().for_each(|sample| hash.add_sample(sample));
     ask_environment(&scene, &mut pcg, &mut hash);
     format!("{number:2} {n:2}/{m:2} {drawn:5} {:016x} {}\n", hash.0, scene.name)
 }

@@ -4,6 +4,7 @@
 //! filtered means, and answers three questions: how bright a direction is, how bright a region of directions is
 //! (conservatively, for portals), and which direction to trace.
 
+mod balls;
 mod build;
 mod clipped_square;
 mod descend;

@@ -28,11 +28,6 @@ impl Aabb {
         (self.max - self.min).max(Vec3::ZERO)
     }
 
-    /// Centre; halved before adding, so that no finite box overflows.
-    pub(crate) fn center(&self) -> Vec3 {
-        0.5 * self.min + 0.5 * self.max
-    }
-
     /// Surface area; zero for the empty box.
     pub(crate) fn area(&self) -> f32 {
         let e = self.extent();

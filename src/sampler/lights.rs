@@ -2,13 +2,11 @@
 
 use alloc::vec::Vec;
 
-use glam::Vec3;
-
 use super::builder::LightSamplerBuilder;
 use super::energy::Scales;
 use super::mesh::mesh_of;
 use crate::blas;
-use crate::env::{Environment, EnvironmentView, Footprint};
+use crate::env::{Environment, EnvironmentView};
 use crate::light::{Illumination, LightTriangle, Lit};
 use crate::record::{ShadingPoint, TriangleId};
 use crate::tlas::{self, Tlas, TlasView};
@@ -192,12 +190,13 @@ pub(super) struct Scene<'a> {
 }
 
 impl tlas::Scene for Scene<'_> {
-    fn radiance(&self, center: Vec3, radius: f32) -> f32 {
+    #[inline(always)]
+    fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N] {
         let mean = self.environment.mean_without_suns();
         if mean <= 0.0 {
-            return 0.0;
+            return [0.0; N];
         }
-        self.environment.average(&Footprint::ball(center, radius)).value / mean
+        self.environment.averages_of_balls(centers, radii, set).map(|value| value / mean)
     }
 
     #[inline]

@@ -14,10 +14,10 @@ use crate::warp::{keep_least, within_range};
 
 /// What the tree asks of the level above.
 pub(crate) trait Scene {
-    /// Mean radiance, relative to the mean over all directions, of what a portal shows in the directions from the
-    /// shading point to a ball with this centre (relative to the shading point) and radius. Zero only if all of
-    /// it is black.
-    fn radiance(&self, center: Vec3, radius: f32) -> f32;
+    /// Mean radiances, relative to the mean over all directions, of what portals show in the directions from the
+    /// shading point to balls with these centres (by axis, relative to the shading point) and radii. Zero only where
+    /// all of it is black. Only those in a set of bits are asked for.
+    fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N];
 
     /// Whether anything at all can travel from a leaf to the shading point. Asked only where the bounds of a leaf leave
     /// that open.
@@ -26,8 +26,8 @@ pub(crate) trait Scene {
 
 impl<S: Scene> Scene for &S {
     #[inline(always)]
-    fn radiance(&self, center: Vec3, radius: f32) -> f32 {
-        (**self).radiance(center, radius)
+    fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N] {
+        (**self).radiances(centers, radii, set)
     }
 
     #[inline(always)]
@@ -103,17 +103,20 @@ impl<const N: usize> Node<N> {
     #[inline(always)]
     pub(super) fn weights(&self, x: &Sight, scene: &impl Scene) -> [f32; N] {
         let Estimates { mut weights, mut largest, doubtful } = self.estimates(x);
-        if doubtful != 0 || { self.portals } != [0; N] {
-            largest = self.ask(x, scene, &mut weights, doubtful);
+        let shows = { self.portals } != [0; N];
+        if doubtful != 0 {
+            largest = self.ask(scene, &mut weights, doubtful);
+        }
+        if shows {
+            largest = self.look_through(x, scene, &mut weights);
         }
         keep_least(&mut weights, largest);
         weights
     }
 
-    /// Asks the level above about leaves in doubt and about what is seen through portals, and returns the bits of the
-    /// largest weight.
+    /// Asks the level above about leaves in doubt, and returns the bits of the largest weight.
     #[inline(never)]
-    fn ask(&self, x: &Sight, scene: &impl Scene, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
+    fn ask(&self, scene: &impl Scene, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
         while doubtful != 0 {
             let lane = doubtful.trailing_zeros() as usize;
             doubtful &= doubtful - 1;
@@ -122,23 +125,35 @@ impl<const N: usize> Node<N> {
                 weights[lane] = 0.0;
             }
         }
-        if { self.portals } != [0; N] {
-            self.look_through(x, scene, weights);
-        }
         weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()))
     }
 
-    /// Multiplies what comes through portals by what is seen there.
-    fn look_through(&self, x: &Sight, scene: &impl Scene, weights: &mut [f32; N]) {
-        for (lane, weight) in weights.iter_mut().enumerate().filter(|(_, weight)| **weight > 0.0) {
-            let share = f32::from(self.portals[lane]) * (1.0 / f32::from(ALL));
-            if share > 0.0 {
-                let aabb = self.aabb(lane);
-                let radiance = scene.radiance(aabb.center() - x.position, 0.5 * aabb.extent().length());
-                let factor = 1.0 - share + share * radiance;
-                *weight = only_if(factor > 0.0, within_range(*weight * factor));
-            }
+    /// Multiplies what comes through portals by what is seen there, and returns the bits of the largest weight.
+    #[inline(always)]
+    fn look_through(&self, x: &Sight, scene: &impl Scene, weights: &mut [f32; N]) -> u32 {
+        let (portals, centers, halves) = (self.portals, self.centers, self.halves);
+        let origin = Vec3::from_array(self.origin) - x.position;
+        let step = Vec3::from_array(self.steps.map(wide));
+        let (mut balls, mut radii, mut set) = ([[0.0; N]; 3], [0.0; N], 0);
+        for i in 0..N {
+            let half = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
+            let center = Vec3::new(f32::from(centers[0][i]), f32::from(centers[1][i]), f32::from(centers[2][i]));
+            let center = origin + center * step;
+            (balls[0][i], balls[1][i], balls[2][i]) = (center.x, center.y, center.z);
+            radii[i] = 0.5 * math::sqrt((half * step).length_squared());
+            set |= u32::from((weights[i] > 0.0) & (portals[i] > 0)) << i;
         }
+        let radiances = scene.radiances(&balls, &radii, set);
+        let mut largest = 0;
+        for i in 0..N {
+            let share = f32::from(portals[i]) * (1.0 / f32::from(ALL));
+            let factor = 1.0 - share + share * radiances[i];
+            let weight =
+                if portals[i] > 0 { only_if(factor > 0.0, within_range(weights[i] * factor)) } else { weights[i] };
+            weights[i] = only_if(weights[i] > 0.0, weight);
+            largest = largest.max(weights[i].to_bits());
+        }
+        largest
     }
 
     /// The geometry of all lanes, in one plain loop over arrays that a compiler can turn into vectors.

@@ -30,7 +30,7 @@ pub(crate) fn hostile(pcg: &mut Pcg32) -> f32 {
 /// Of up to a thousand triangles.
 pub(crate) fn random_scene(number: usize, pcg: &mut Pcg32) -> Scene {
     let triangles = [1, 2, 10, 100, 1000][number % 5];
-    let content = Content { triangles, textured: pcg.below(3) > 0, sky: pcg.below(4), two_sided: pcg.below(2) == 0 };
+    let content = Content { triangles, textured: pcg.below(3) > 0, sky: pcg.below(5), two_sided: pcg.below(2) == 0 };
     let mut scene = Scene::random(pcg, content);
     // Every other scene is moved, scaled or flattened to slivers.
     let change = |scene: &mut Scene, f: &dyn Fn(Vec3) -> Vec3| {

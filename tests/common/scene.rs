@@ -80,9 +80,9 @@ impl Image {
 }
 
 impl Sky {
-    /// 0: constant, 1: noise, 2: one lit pixel, 3: a black hemisphere.
+    /// 0: constant, 1: noise, 2: one lit pixel, 3: a black hemisphere, 4: noise with a sun.
     pub(crate) fn random(pcg: &mut Pcg32, kind: usize) -> Self {
-        let size = [16, 8];
+        let size = if kind == 4 { [64, 32] } else { [16, 8] };
         let lit = pcg.below(size[0] * size[1]);
         let texel = |i: usize, pcg: &mut Pcg32| match kind {
             1 => 0.2 + pcg.f32(),
@@ -91,6 +91,13 @@ impl Sky {
                     50.0
                 } else {
                     0.0
+                }
+            }
+            4 => {
+                if i == lit {
+                    3000.0
+                } else {
+                    0.2 + pcg.f32()
                 }
             }
             _ => {

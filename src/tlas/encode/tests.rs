@@ -16,8 +16,8 @@ use crate::tlas::tests::build;
 struct Open;
 
 impl Scene for Open {
-    fn radiance(&self, _center: Vec3, _radius: f32) -> f32 {
-        1.0
+    fn radiances<const N: usize>(&self, _centers: &[[f32; N]; 3], _radii: &[f32; N], _set: u32) -> [f32; N] {
+        [1.0; N]
     }
 
     fn is_visible(&self, _leaf: u32) -> bool {
