@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+#[cfg(test)]
 use crate::geometry::Aabb;
 
 /// Most leaves that a tree can number.
@@ -172,7 +173,7 @@ impl<const N: usize> Node<N> {
     }
 
     /// The corners of one box. Each is rounded once, so that it still holds what it was made for.
-    #[inline(always)]
+    #[cfg(test)]
     pub(super) fn aabb(&self, lane: usize) -> Aabb {
         let (origin, steps) = (self.origin, self.steps);
         let corner = |axis: usize, sign: f32| {

@@ -133,14 +133,20 @@ impl<const N: usize> TlasView<'_, N> {
     /// Least and largest distance from a point to the boxes of a node's children.
     fn distances(&self, node: usize, x: &ShadingPoint) -> (f32, f32) {
         let node = &self.nodes[node];
-        let lanes = (0..N).filter(|&lane| node.child(lane) != Child::Empty);
-        let (near2, far2) = lanes.fold((f32::INFINITY, 0.0f32), |(near2, far2), lane| {
-            let aabb = node.aabb(lane);
-            let (below, above) = (aabb.min - x.position, x.position - aabb.max);
-            let near = below.max(above).max(glam::Vec3::ZERO);
-            let far = below.abs().max(above.abs());
-            (near2.min(near.length_squared()), far2.max(far.length_squared()))
-        });
+        let (low, high) = node.corners();
+        let (mut near2, mut far2) = ([0.0; N], [0.0; N]);
+        for axis in 0..3 {
+            for lane in 0..N {
+                let (below, above) = (low[axis][lane] - x.position[axis], x.position[axis] - high[axis][lane]);
+                let near = math::at_least(if below > above { below } else { above }, 0.0);
+                let far = if below.abs() > above.abs() { below } else { above };
+                near2[lane] += near * near;
+                far2[lane] += far * far;
+            }
+        }
+        let width = usize::from(node.width).min(N);
+        let near2 = near2[..width].iter().fold(f32::INFINITY, |a, b| a.min(*b));
+        let far2 = far2[..width].iter().fold(0.0, |a: f32, b| a.max(*b));
         (math::sqrt(near2), math::sqrt(far2))
     }
 }
