@@ -106,13 +106,3 @@ fn samples_and_densities_are_those_of_before() {
     assert!(differing.is_empty(), "found and known: {differing:#?}");
     assert_eq!(found.lines().count(), known.lines().count());
 }
-
-#[test]
-fn another_bit_is_another_line() {
-    let hash = |value: f32| {
-        let mut hash = Hash::new();
-        hash.add(&[1.0, value]);
-        hash.0
-    };
-    assert_ne!(hash(1.0), hash(f32::from_bits(1.0f32.to_bits() + 1)));
-}

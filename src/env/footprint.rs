@@ -17,11 +17,11 @@ use crate::math;
 use crate::warp::equal_area::{SPHERE, STRETCH, sphere_to_square, wrap_texel_log2};
 use glam::Vec3;
 
-/// Share of the cover's mean in the estimate.
+/// Share of the cover's mean in the estimate (or of a larger region's).
 ///
 /// The variance that a bright spot causes which the talk's look-up misses grows with its inverse; where that
 /// look-up is right, it costs its share of the samples.
-const DEFENSIVE: f32 = 0.02;
+pub(super) const DEFENSIVE: f32 = 0.02;
 
 /// Ratio of least to largest radiance from which a region counts as even.
 const EVEN: f32 = 0.6;
@@ -42,7 +42,7 @@ pub(crate) struct Footprint {
 
 impl Footprint {
     /// The directions to a ball with this centre, relative to the viewer, and radius.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn ball(center: Vec3, radius: f32) -> Self {
         let inverse = 1.0 / math::sqrt(center.length_squared().max(f32::MIN_POSITIVE));
         let sin_radius = radius * inverse;
@@ -133,8 +133,8 @@ impl EnvironmentView<'_> {
     }
 
     /// Depth of the level whose 3x3 filter is nearest to a solid angle, Ω = min(4π, 9 · 4π / 4^depth).
-    #[inline]
-    fn depth_of_solid_angle(&self, solid_angle: f32) -> u32 {
+    #[inline(always)]
+    pub(super) fn depth_of_solid_angle(&self, solid_angle: f32) -> u32 {
         // Rounding log4(q) to nearest is flooring log4(2 q) = log2(2 q) / 2. Zero and NaN give the finest level.
         let q = 9.0 * SPHERE / solid_angle.max(f32::MIN_POSITIVE);
         (floor_log2(2.0 * q) >> 1).clamp(0, self.header.depth as i32) as u32
@@ -151,7 +151,7 @@ fn asin_bound(sine: f32) -> f32 {
 }
 
 /// Floor of the base-2 logarithm of a positive number, from its exponent.
-#[inline]
+#[inline(always)]
 fn floor_log2(x: f32) -> i32 {
     (x.to_bits() >> 23) as i32 - 127
 }

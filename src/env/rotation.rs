@@ -16,7 +16,7 @@ pub(super) fn to_world(rotation: &[[f32; 3]; 3], local: Vec3) -> Vec3 {
 }
 
 /// Direction in the environment's frame of a world direction.
-#[inline]
+#[inline(always)]
 pub(super) fn to_local(rotation: &[[f32; 3]; 3], world: Vec3) -> Vec3 {
     let [x, y, z] = rotation.map(Vec3::from_array);
     Vec3::new(x.dot(world), y.dot(world), z.dot(world))

@@ -153,7 +153,7 @@ impl<'a> EnvironmentView<'a> {
 }
 
 /// Number of the texel that holds a point of the square, in the level with `2^depth` texels a side.
-#[inline]
+#[inline(always)]
 pub(super) fn texel_at(depth: u32, point: Vec2) -> u32 {
     // The product is exact, and the cast truncates; the square's far edges belong to the last texel.
     let (scale, last) = ((1_u32 << depth) as f32, (1 << depth) - 1);

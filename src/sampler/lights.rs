@@ -8,6 +8,7 @@ use super::mesh::mesh_of;
 use crate::blas;
 use crate::env::{Environment, EnvironmentView};
 use crate::light::{Illumination, LightTriangle, Lit};
+use crate::math::{at_least, only_if};
 use crate::record::{ShadingPoint, TriangleId};
 use crate::tlas::{self, Tlas, TlasView};
 
@@ -196,7 +197,9 @@ impl tlas::Scene for Scene<'_> {
         if mean <= 0.0 {
             return [0.0; N];
         }
-        self.environment.averages_of_balls(centers, radii, set).map(|value| value / mean)
+        // What is not black stays so, however bright the rest is.
+        let relative = |value: f32| only_if(value > 0.0, at_least(value / mean, f32::MIN_POSITIVE));
+        self.environment.averages_of_balls(centers, radii, set).map(relative)
     }
 
     #[inline]

@@ -103,11 +103,10 @@ impl<const N: usize> Node<N> {
     #[inline(always)]
     pub(super) fn weights(&self, x: &Sight, scene: &impl Scene) -> [f32; N] {
         let Estimates { mut weights, mut largest, doubtful } = self.estimates(x);
-        let shows = { self.portals } != [0; N];
         if doubtful != 0 {
             largest = self.ask(scene, &mut weights, doubtful);
         }
-        if shows {
+        if { self.portals } != [0; N] {
             largest = self.look_through(x, scene, &mut weights);
         }
         keep_least(&mut weights, largest);
@@ -148,9 +147,8 @@ impl<const N: usize> Node<N> {
         for i in 0..N {
             let share = f32::from(portals[i]) * (1.0 / f32::from(ALL));
             let factor = 1.0 - share + share * radiances[i];
-            let weight =
-                if portals[i] > 0 { only_if(factor > 0.0, within_range(weights[i] * factor)) } else { weights[i] };
-            weights[i] = only_if(weights[i] > 0.0, weight);
+            let is_lit = (weights[i] > 0.0) & (factor > 0.0);
+            weights[i] = only_if(is_lit, within_range(weights[i] * factor));
             largest = largest.max(weights[i].to_bits());
         }
         largest

@@ -5,9 +5,6 @@ use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-#[cfg(test)]
-use crate::geometry::Aabb;
-
 /// Most leaves that a tree can number.
 pub(crate) const MAX_LEAVES: usize = (1 << 28) - 1;
 
@@ -156,7 +153,8 @@ impl<const N: usize> Node<N> {
         self.normals[lane] & TWO_SIDED != 0
     }
 
-    /// The least and largest coordinates of all boxes, by axis: those of [`Self::aabb`].
+    /// The least and largest coordinates of all boxes, by axis. Each is rounded once, so that a box still holds what it
+    /// was made for.
     #[inline(always)]
     pub(super) fn corners(&self) -> ([[f32; N]; 3], [[f32; N]; 3]) {
         let (origin, steps, centers, halves) = (self.origin, self.steps, self.centers, self.halves);
@@ -170,18 +168,6 @@ impl<const N: usize> Node<N> {
             }
         }
         (low, high)
-    }
-
-    /// The corners of one box. Each is rounded once, so that it still holds what it was made for.
-    #[cfg(test)]
-    pub(super) fn aabb(&self, lane: usize) -> Aabb {
-        let (origin, steps) = (self.origin, self.steps);
-        let corner = |axis: usize, sign: f32| {
-            let halves = 2.0 * f32::from(self.centers[axis][lane]) + sign * f32::from(self.halves[axis][lane]);
-            origin[axis] + halves * (0.5 * wide(steps[axis]))
-        };
-        let corners = [-1.0, 1.0].map(|sign| Vec3::from_array([0, 1, 2].map(|axis| corner(axis, sign))));
-        Aabb { min: corners[0], max: corners[1] }
     }
 }
 

@@ -43,24 +43,18 @@ pub fn square_to_sphere(point: Vec2) -> Vec3 {
 /// Point of the unit square that a unit direction maps to, within 2.5e-7 of the exact map.
 ///
 /// Any vector gives a point of the square; only for unit vectors it is the right one.
-#[inline]
-pub fn sphere_to_square(direction: Vec3) -> Vec2 {
-    to_square(direction.x, direction.y, direction.z).into()
-}
-
-/// [`sphere_to_square`] as part of a loop that becomes vectors.
 #[inline(always)]
-pub(crate) fn to_square(to_x: f32, to_y: f32, to_z: f32) -> (f32, f32) {
-    let (x, y, z) = (to_x.abs(), to_y.abs(), to_z.abs());
+pub fn sphere_to_square(direction: Vec3) -> Vec2 {
+    let (x, y, z) = (direction.x.abs(), direction.y.abs(), direction.z.abs());
     // 1 - |z| = (x² + y²) / (1 + |z|): no cancellation near the poles.
     let r = limit(sqrt((x * x + y * y) / (1.0 + z)), 1.0);
     let minor = quarter_of_eighth(x.min(y), x.max(y)) * r;
     let major = r - minor;
     let (a, b) = if y > x { (minor, major) } else { (major, minor) };
     // Distances from the centre lines; the lower hemisphere is mirrored at the diamond.
-    let (u, v) = if to_z < 0.0 { (1.0 - b, 1.0 - a) } else { (a, b) };
+    let (u, v) = if direction.z < 0.0 { (1.0 - b, 1.0 - a) } else { (a, b) };
     let place = |distance: f32, side: f32| limit(0.5 + 0.5 * distance.copysign(side), 1.0);
-    (place(u, to_x), place(v, to_y))
+    Vec2::new(place(u, direction.x), place(v, direction.y))
 }
 
 /// Sine and cosine of `quarter` quarter turns, for `quarter` in `[0, 1/2]`. Relative error below 1e-7.

@@ -56,9 +56,11 @@ fn boxes_grow_and_energies_stay_positive() {
             let mut node = Node::<8>::new(1, 0, 0, lights.len());
             node.set(&lights);
             let [flux, portal] = node.energies();
+            let (low, high) = node.corners();
+            let corner = |corners: [[f32; 8]; 3], lane: usize| Vec3::from_array(corners.map(|values| values[lane]));
             for (lane, (bounds, moments)) in lights.iter().enumerate() {
-                let (found, exact) = (node.aabb(lane), bounds.aabb);
-                assert!(found.min.cmple(exact.min).all() && found.max.cmpge(exact.max).all(), "{found:?} {exact:?}");
+                let (min, max, exact) = (corner(low, lane), corner(high, lane), bounds.aabb);
+                assert!(min.cmple(exact.min).all() && max.cmpge(exact.max).all(), "{min} {max} {exact:?}");
                 assert_eq!((flux[lane] > 0.0, portal[lane] > 0.0), (bounds.flux > 0.0, bounds.portal > 0.0));
                 let error = (flux[lane] + portal[lane]) / moments.energy - 1.0;
                 assert!(error.abs() < 0.005, "{error}");
