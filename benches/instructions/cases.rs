@@ -10,12 +10,16 @@ use smallvec::SmallVec;
 use crate::scenes::pcg::Pcg32;
 use crate::scenes::{self, Scene};
 
-/// Calls a case.
-pub(crate) const CALLS: usize = 256;
+/// Calls of a case that is counted a call.
+const CALLS: usize = 256;
+/// Numbers that are tried at a point to find out whether it is lit.
+const TRIES: usize = 64;
 
 /// One thing to be counted.
 pub(crate) struct Case {
     pub(crate) name: &'static str,
+    /// Calls that the count is divided by.
+    pub(crate) calls: usize,
     run: fn(),
 }
 
@@ -31,31 +35,48 @@ pub(crate) fn find(name: &str) -> Option<&'static Case> {
 
 /// All cases. `cloud` is cloud-10000.
 pub(crate) const ALL: &[Case] = &[
-    Case { name: "cloud/sample", run: || sample("cloud-10000") },
-    Case { name: "cloud/pmf", run: || of_samples("cloud-10000", |lights, x, s| lights.pmf(x, s.hit.triangle)) },
-    Case { name: "cloud/pdf", run: || of_samples("cloud-10000", |lights, x, s| lights.pdf(x, &s.hit)) },
+    Case { name: "cloud/sample", calls: CALLS, run: || sample("cloud-10000") },
+    Case {
+        name: "cloud/pmf",
+        calls: CALLS,
+        run: || of_samples("cloud-10000", |lights, x, s| lights.pmf(x, s.hit.triangle)),
+    },
+    Case { name: "cloud/pdf", calls: CALLS, run: || of_samples("cloud-10000", |lights, x, s| lights.pdf(x, &s.hit)) },
     Case {
         name: "cloud/pdf_direction",
+        calls: CALLS,
         run: || of_samples("cloud-10000", |lights, x, s| lights.pdf_direction(x, s.direction)),
     },
-    Case { name: "cloud/sample_split", run: sample_split },
-    Case { name: "cloud/build", run: build },
-    Case { name: "quad/sample", run: || sample("quad") },
-    Case { name: "quad/pdf", run: || of_samples("quad", |lights, x, s| lights.pdf(x, &s.hit)) },
-    Case { name: "window/sample", run: || sample("window") },
-    Case { name: "window/pdf", run: || of_samples("window", |lights, x, s| lights.pdf(x, &s.hit)) },
+    Case { name: "cloud/sample_split", calls: CALLS, run: sample_split },
+    Case { name: "cloud/nee", calls: CALLS, run: || next_event("cloud-10000") },
+    Case { name: "cloud/build", calls: 1, run: build },
+    Case { name: "quad/sample", calls: CALLS, run: || sample("quad") },
+    Case { name: "quad/pdf", calls: CALLS, run: || of_samples("quad", |lights, x, s| lights.pdf(x, &s.hit)) },
+    Case { name: "quad/nee", calls: CALLS, run: || next_event("quad") },
+    Case { name: "window/sample", calls: CALLS, run: || sample("window") },
+    Case { name: "window/pdf", calls: CALLS, run: || of_samples("window", |lights, x, s| lights.pdf(x, &s.hit)) },
     Case {
         name: "window/pdf_direction",
+        calls: CALLS,
         run: || of_samples("window", |lights, x, s| lights.pdf_direction(x, s.direction)),
     },
-    Case { name: "window/emission", run: emission },
-    Case { name: "star/sample", run: || sample("star") },
-    Case { name: "grid-100/sample", run: || sample("grid-100") },
+    Case { name: "window/at", calls: CALLS, run: at },
+    Case { name: "window/nee", calls: CALLS, run: || next_event("window") },
+    Case { name: "window/emission", calls: CALLS, run: emission },
+    Case { name: "star/sample", calls: CALLS, run: || sample("star") },
+    Case { name: "star/nee", calls: CALLS, run: || next_event("star") },
+    Case { name: "grid-100/sample", calls: CALLS, run: || sample("grid-100") },
+    Case { name: "grid-100/nee", calls: CALLS, run: || next_event("grid-100") },
     Case {
         name: "environment/sample",
+        calls: CALLS,
         run: || environment(|sky, u| sky.sample([u[0], u[1]]).map_or(0.0, |sample| sample.radiance)),
     },
-    Case { name: "environment/pdf", run: || environment(|sky, u| sky.pdf(glam::Vec3::from(u).normalize())) },
+    Case {
+        name: "environment/pdf",
+        calls: CALLS,
+        run: || environment(|sky, u| sky.pdf(glam::Vec3::from(u).normalize())),
+    },
 ];
 
 /// Everything in here is counted, and nothing else.
@@ -132,6 +153,39 @@ fn sample_split() {
         let mut samples = SmallVec::<[LightSample; 16]>::new();
         lights.sample_split(&points[i], numbers[i], &splitting, &mut samples);
         black_box(samples);
+    });
+}
+
+/// Points of a workload at which something arrives, with the sampler.
+fn lit_points(scene: &Scene, lights: &LightSampler) -> Vec<ShadingPoint> {
+    let mut pcg = Pcg32::new(4, 4);
+    let points = scene.points.timing(16 * CALLS);
+    let lit = points.into_iter().filter(|x| (0..TRIES).any(|_| lights.sample(x, pcg.uniform3()).is_some()));
+    let lit: Vec<_> = lit.take(CALLS).collect();
+    assert_eq!(lit.len(), CALLS, "a workload has too few lit points");
+    lit
+}
+
+/// What a host does at a lit point for one light sample.
+fn next_event(workload: &str) {
+    let scene = scenes::scene(workload);
+    let lights = lights(&scene);
+    let (points, numbers) = (lit_points(&scene, &lights), numbers());
+    measured(|i| {
+        let here = lights.at(&points[i]);
+        if let Some(sample) = here.sample(numbers[i]) {
+            black_box(here.pdf_sample_direction(&sample));
+            black_box(sample);
+        }
+    });
+}
+
+fn at() {
+    let scene = scenes::scene("window");
+    let lights = lights(&scene);
+    let points = lit_points(&scene, &lights);
+    measured(|i| {
+        black_box(&lights.at(&points[i]));
     });
 }
 

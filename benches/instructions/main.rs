@@ -6,6 +6,8 @@
 //! cargo bench --bench instructions -- --update  # writes the baseline
 //! ```
 //!
+//! Cases named `nee` are what a host does at a lit point: `at`, `sample`, and the density of the sampled direction.
+//!
 //! The program runs itself under Valgrind once for each case, and has what happens inside of [`measured`] counted.
 
 mod cases;
@@ -73,7 +75,7 @@ fn count(case: &cases::Case) -> Result<u64, Error> {
     if total == 0 {
         return Err(format!("{}: nothing was counted", case.name).into());
     }
-    Ok(total / cases::CALLS as u64)
+    Ok(total / case.calls as u64)
 }
 
 fn read(path: &Path) -> Result<Counts, Error> {

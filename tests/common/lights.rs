@@ -112,7 +112,7 @@ pub(crate) fn aligned(bytes: &[u8]) -> Vec<u32> {
 }
 
 /// The arities that are tested: of the tree over triangles, and of the trees over textures.
-pub(crate) const ARITIES: [(usize, usize); 7] = [(8, 4), (4, 4), (16, 4), (4, 16), (8, 16), (16, 16), (8, 64)];
+pub(crate) const ARITIES: [(usize, usize); 3] = [(8, 4), (4, 4), (16, 4)];
 
 /// A sampler of these arities.
 pub(crate) fn build(scene: &Scene, arities: (usize, usize)) -> Box<dyn Lights> {
@@ -120,10 +120,6 @@ pub(crate) fn build(scene: &Scene, arities: (usize, usize)) -> Box<dyn Lights> {
         (4, 4) => Box::new(scene.build::<4, 4>()),
         (8, 4) => Box::new(scene.build::<8, 4>()),
         (16, 4) => Box::new(scene.build::<16, 4>()),
-        (4, 16) => Box::new(scene.build::<4, 16>()),
-        (8, 16) => Box::new(scene.build::<8, 16>()),
-        (16, 16) => Box::new(scene.build::<16, 16>()),
-        (8, 64) => Box::new(scene.build::<8, 64>()),
         _ => unreachable!("no such arities are tested"),
     }
 }

@@ -17,7 +17,7 @@ const AGREEMENT: f64 = 1e-5;
 const IRRADIANCE: f64 = 1e-3;
 
 /// Arities of the trees over triangles and over textures; each with lights of one and of two sides.
-const ARITIES: [(usize, usize); 4] = [(8, 4), (4, 16), (16, 4), (8, 64)];
+const ARITIES: [(usize, usize); 3] = [(8, 4), (4, 4), (16, 4)];
 const VARIANTS: usize = 2 * ARITIES.len();
 const RECEIVERS: usize = 3;
 /// A combination that misses a bar is done again with so many times the samples.
