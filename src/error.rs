@@ -22,6 +22,11 @@ impl Error {
         Self(Kind::Bytes { what, at, found, expected })
     }
 
+    /// A section of bytes whose version this build does not read.
+    pub(crate) fn section(what: &'static str, found: u32, expected: u32) -> Self {
+        Self(Kind::SectionVersion { what, found, expected })
+    }
+
     /// `Ok` if a count that bytes hold is the expected one.
     pub(crate) fn unless_equal(what: &'static str, found: usize, expected: usize) -> Result<(), Self> {
         if found == expected { Ok(()) } else { Err(Self::bytes(what, 0, found, expected)) }
@@ -69,6 +74,8 @@ pub(crate) enum Kind {
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
     Cancelled,
+    /// A section of bytes of another version.
+    SectionVersion { what: &'static str, found: u32, expected: u32 },
     /// Bytes that do not hold what they should.
     Bytes { what: &'static str, at: usize, found: u64, expected: u64 },
 }
@@ -127,6 +134,9 @@ impl fmt::Display for Error {
             }
             Kind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             Kind::Cancelled => write!(f, "the build was cancelled"),
+            Kind::SectionVersion { what, found, expected } => {
+                write!(f, "bytes: section `{what}` has version {found}, but this build reads version {expected}")
+            }
             Kind::Bytes { what, at, found, expected } => {
                 write!(f, "bytes: {what} at {at} is {found:#x}, expected {expected:#x}")
             }

@@ -118,12 +118,14 @@ extern crate std;
 
 mod blas;
 mod bounds;
+mod buffers;
 mod env;
 mod error;
 mod geometry;
 mod light;
 mod math;
 mod parallel;
+mod receiver;
 mod record;
 mod sampler;
 mod simd;
@@ -143,7 +145,8 @@ pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
 pub use light::Illumination;
-pub use record::{Filter, Hit, LightSample, Receiver, ShadingPoint, TriangleId, Wrap};
+pub use receiver::{Receiver, ShadingPoint};
+pub use record::{Filter, Hit, LightSample, TriangleId, Wrap};
 pub use sampler::{
     Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, PointSampler,
     Sides, TextureId, Weight,

@@ -2,8 +2,10 @@
 
 mod aabb;
 mod cone;
+mod horizon;
 mod triangle;
 
 pub(crate) use aabb::Aabb;
 pub(crate) use cone::{Cone, angle};
+pub(crate) use horizon::{HORIZON_ROUNDING, horizon, is_below};
 pub(crate) use triangle::{Triangle, intersect, normal_and_area};

@@ -2,8 +2,9 @@
 
 mod image;
 mod sample;
-mod shading;
 
 pub use image::{Filter, Wrap};
 pub use sample::{Hit, LightSample, TriangleId};
-pub use shading::{Receiver, ShadingPoint};
+
+// Until all importers have moved.
+pub(crate) use crate::receiver::{Receiver, ShadingPoint};

@@ -1,0 +1,206 @@
+//! The point that light is gathered at, and how a direction is weighted there.
+//!
+//! Each kind of receiver is a file, which answers the same questions ([`ReceiverKind`]): the weight of a direction, whether
+//! a triangle is dark for certain, the mean over a cone of directions, the weights of the cells of a triangle, the exact
+//! irradiance, and what the loop over the lanes of a tree's node needs. A new kind is a new file, a variant of
+//! [`Receiver`] and a line in `dispatch`.
+
+mod lambert;
+mod lanes;
+mod surface;
+mod transmissive;
+mod volume;
+
+use glam::Vec3;
+
+pub(crate) use lanes::ReceiverLanes;
+use surface::Surface;
+use transmissive::Transmissive;
+use volume::Volume;
+
+/// Weight of a direction at a shading point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Receiver {
+    /// An opaque surface with this unit normal: `max(0, cos θ)`.
+    Surface(Vec3),
+    /// A surface that also passes light through, with this unit normal: `|cos θ|`.
+    Transmissive(Vec3),
+    /// A point in a medium: every direction counts the same.
+    Volume,
+}
+
+/// A position, and how a direction is weighted there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ShadingPoint {
+    /// World position. Nothing arrives at a position with a coordinate that is not finite or is above 1e15.
+    pub position: Vec3,
+    /// Weight of a direction at this point.
+    pub receiver: Receiver,
+}
+
+/// Largest difference of a squared length from 1 up to which a normal counts as a unit vector.
+///
+/// Twice 1e-3 to first order, which is what a normal interpolated in half precision is off. A larger value accepts normals
+/// that bias nothing but guide worse; a smaller one spends time on normals that are good enough. Documented at
+/// [`ShadingPoint::new`].
+const UNIT_TOLERANCE: f32 = 2e-3;
+
+impl ShadingPoint {
+    /// Returns a point with any receiver.
+    ///
+    /// A normal whose length is within 1e-3 of 1 is taken as it is, bit for bit. Any other normal is normalized; one without
+    /// a direction (zero, infinite or NaN) stays as it is, and the samples at such a point are valid but useless.
+    #[must_use]
+    pub fn new(position: Vec3, receiver: Receiver) -> Self {
+        let receiver = match receiver {
+            Receiver::Surface(normal) => Receiver::Surface(unit(normal)),
+            Receiver::Transmissive(normal) => Receiver::Transmissive(unit(normal)),
+            Receiver::Volume => Receiver::Volume,
+        };
+        Self { position, receiver }
+    }
+
+    /// Returns a point on an opaque surface. `normal` is a unit vector to the side that light is gathered from; see
+    /// [`Self::new`] for other lengths.
+    #[must_use]
+    pub fn surface(position: Vec3, normal: Vec3) -> Self {
+        Self { position, receiver: Receiver::Surface(unit(normal)) }
+    }
+
+    /// Returns a point on a surface that gathers light from both sides. `normal` is a unit vector; see [`Self::new`] for
+    /// other lengths.
+    #[must_use]
+    pub fn transmissive(position: Vec3, normal: Vec3) -> Self {
+        Self { position, receiver: Receiver::Transmissive(unit(normal)) }
+    }
+
+    /// Returns a point in a participating medium.
+    #[must_use]
+    pub const fn volume(position: Vec3) -> Self {
+        Self { position, receiver: Receiver::Volume }
+    }
+
+    /// Returns the weight of a unit direction that points away from this point: clamped, absolute or no cosine.
+    #[must_use]
+    pub fn cosine(&self, direction: Vec3) -> f32 {
+        self.receiver.weight(direction)
+    }
+}
+
+/// A normal of unit length, untouched if it has that length already.
+#[inline]
+fn unit(normal: Vec3) -> Vec3 {
+    if (normal.length_squared() - 1.0).abs() <= UNIT_TOLERANCE { normal } else { normal.normalize_or(normal) }
+}
+
+/// Heights of the corners of cells over the receiver's plane, each with the corner's weight in the cell's mean.
+pub(crate) struct CornerHeights<'a, const LANES: usize> {
+    /// Heights, by corner. Zero without a normal.
+    pub(crate) heights: &'a [[f32; LANES]; 3],
+    /// Weights, by corner; those of one cell sum to 1.
+    pub(crate) weights: &'a [[f32; LANES]; 3],
+    /// Squared distances of the cells, softened: the square root stands in for the height where every direction counts.
+    pub(crate) distance2: &'a [f32; LANES],
+}
+
+/// The questions that every kind of receiver answers.
+pub(crate) trait ReceiverKind: Copy {
+    /// Returns the weight of a unit direction.
+    fn weight(self, direction: Vec3) -> f32;
+
+    /// Returns the normal that heights are measured along; zero without one.
+    fn normal(self) -> Vec3;
+
+    /// Whether a triangle with these vertices, relative to the receiver, sends nothing there for certain.
+    fn is_dark(self, vertices: &[Vec3; 3]) -> bool;
+
+    /// Whether height below the plane of [`Self::normal`] makes a cell dark.
+    fn has_horizon(self) -> bool;
+
+    /// Returns the mean weight of the directions of a cone. Zero only if all of them have the weight zero.
+    fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32;
+
+    /// Returns the mean weights of cells times their distances, by the weights at their corners.
+    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES];
+
+    /// Returns the weight of the direction to a center at this mean height and distance.
+    fn weight_at_height(self, height: f32, inverse_distance: f32) -> f32;
+
+    /// Returns the irradiance over π from a triangle of unit radiance, exact as far as `f32` goes. The vertices are
+    /// relative to the receiver.
+    fn irradiance(self, vertices: &[Vec3; 3]) -> f32;
+
+    /// Returns what the loop over the lanes of a node needs.
+    fn lanes(self, position: Vec3) -> ReceiverLanes;
+}
+
+/// Calls the same method of whichever kind a receiver is.
+macro_rules! dispatch {
+    ($receiver:expr, $kind:ident => $call:expr) => {
+        match $receiver {
+            Receiver::Surface(normal) => {
+                let $kind = Surface { normal };
+                $call
+            }
+            Receiver::Transmissive(normal) => {
+                let $kind = Transmissive { normal };
+                $call
+            }
+            Receiver::Volume => {
+                let $kind = Volume;
+                $call
+            }
+        }
+    };
+}
+
+impl ReceiverKind for Receiver {
+    #[inline]
+    fn weight(self, direction: Vec3) -> f32 {
+        dispatch!(self, kind => kind.weight(direction))
+    }
+
+    #[inline(always)]
+    fn normal(self) -> Vec3 {
+        dispatch!(self, kind => kind.normal())
+    }
+
+    #[inline(always)]
+    fn is_dark(self, vertices: &[Vec3; 3]) -> bool {
+        dispatch!(self, kind => kind.is_dark(vertices))
+    }
+
+    #[inline(always)]
+    fn has_horizon(self) -> bool {
+        dispatch!(self, kind => kind.has_horizon())
+    }
+
+    #[inline]
+    fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32 {
+        dispatch!(self, kind => kind.mean_over_cone(axis, sin_radius))
+    }
+
+    #[inline(always)]
+    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES] {
+        dispatch!(self, kind => kind.mean_over_cells(corners))
+    }
+
+    #[inline]
+    fn weight_at_height(self, height: f32, inverse_distance: f32) -> f32 {
+        dispatch!(self, kind => kind.weight_at_height(height, inverse_distance))
+    }
+
+    fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
+        dispatch!(self, kind => kind.irradiance(vertices))
+    }
+
+    #[inline(always)]
+    fn lanes(self, position: Vec3) -> ReceiverLanes {
+        dispatch!(self, kind => kind.lanes(position))
+    }
+}
+
+#[cfg(test)]
+mod tests;

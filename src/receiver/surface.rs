@@ -1,0 +1,63 @@
+//! An opaque surface: the cosine, clamped at zero.
+
+use glam::Vec3;
+
+use super::lambert::lambert;
+use super::lanes::{LEAST_LANE_COSINE, ReceiverLanes};
+use super::{CornerHeights, ReceiverKind};
+use crate::geometry::is_below;
+
+#[derive(Clone, Copy)]
+pub(super) struct Surface {
+    pub(super) normal: Vec3,
+}
+
+impl ReceiverKind for Surface {
+    #[inline]
+    fn weight(self, direction: Vec3) -> f32 {
+        self.normal.dot(direction).max(0.0)
+    }
+
+    #[inline(always)]
+    fn normal(self) -> Vec3 {
+        self.normal
+    }
+
+    #[inline(always)]
+    fn is_dark(self, vertices: &[Vec3; 3]) -> bool {
+        is_below(self.normal, vertices)
+    }
+
+    #[inline(always)]
+    fn has_horizon(self) -> bool {
+        true
+    }
+
+    /// Exact for a cone above the horizon. A cone that the horizon cuts gets the mean of a linear ramp.
+    #[inline]
+    fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32 {
+        let (cosine, above) = (self.normal.dot(axis), self.normal.dot(axis) + sin_radius);
+        if cosine >= sin_radius { cosine } else { above.max(0.0) * above.max(0.0) / (4.0 * sin_radius) }
+    }
+
+    #[inline(always)]
+    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES] {
+        let ([a, b, c], [p, q, r]) = (corners.heights, corners.weights);
+        core::array::from_fn(|i| p[i] * a[i].max(0.0) + q[i] * b[i].max(0.0) + r[i] * c[i].max(0.0))
+    }
+
+    #[inline]
+    fn weight_at_height(self, height: f32, inverse_distance: f32) -> f32 {
+        height * inverse_distance
+    }
+
+    fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
+        lambert(self.normal, vertices)
+    }
+
+    #[inline(always)]
+    fn lanes(self, position: Vec3) -> ReceiverLanes {
+        let normal = self.normal;
+        ReceiverLanes::new(position, normal, u32::MAX, LEAST_LANE_COSINE, normal, 0.0)
+    }
+}

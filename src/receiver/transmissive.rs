@@ -1,0 +1,61 @@
+//! A surface that gathers light from both sides: the absolute cosine.
+
+use glam::Vec3;
+
+use super::lambert::lambert;
+use super::lanes::{LEAST_LANE_COSINE, ReceiverLanes};
+use super::{CornerHeights, ReceiverKind};
+
+#[derive(Clone, Copy)]
+pub(super) struct Transmissive {
+    pub(super) normal: Vec3,
+}
+
+impl ReceiverKind for Transmissive {
+    #[inline]
+    fn weight(self, direction: Vec3) -> f32 {
+        self.normal.dot(direction).abs()
+    }
+
+    #[inline(always)]
+    fn normal(self) -> Vec3 {
+        self.normal
+    }
+
+    #[inline(always)]
+    fn is_dark(self, _vertices: &[Vec3; 3]) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn has_horizon(self) -> bool {
+        false
+    }
+
+    /// The cosine of the axis, but no less than the mean of a cone whose axis lies in the plane.
+    #[inline]
+    fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32 {
+        self.normal.dot(axis).abs().max(0.5 * sin_radius)
+    }
+
+    #[inline(always)]
+    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES] {
+        let ([a, b, c], [p, q, r]) = (corners.heights, corners.weights);
+        core::array::from_fn(|i| p[i] * a[i].abs() + q[i] * b[i].abs() + r[i] * c[i].abs())
+    }
+
+    #[inline]
+    fn weight_at_height(self, height: f32, inverse_distance: f32) -> f32 {
+        height.abs() * inverse_distance
+    }
+
+    fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
+        lambert(self.normal, vertices) + lambert(-self.normal, vertices)
+    }
+
+    #[inline(always)]
+    fn lanes(self, position: Vec3) -> ReceiverLanes {
+        // All bits of the cosine but its sign: both sides receive.
+        ReceiverLanes::new(position, self.normal, u32::MAX >> 1, LEAST_LANE_COSINE, Vec3::ZERO, 1.0)
+    }
+}
