@@ -1,9 +1,8 @@
 //! Light sampling for renderers: textured mesh lights and light portals of any shape.
 //!
-//! A renderer hands over its emissive meshes, its openings (windows, lattices, clip-mapped cards, lantern paper),
-//! their textures and its environment map. At every shading point it then asks for a direction that is worth
-//! tracing, and for the density of any direction that it found some other way. The method is *Generalized Light
-//! Portals* (Ogaki, HPG 2020).
+//! A renderer passes in its emissive meshes, its openings (windows, lattices, clip-mapped cards, lantern paper), their
+//! textures and its environment map. At every shading point it then gets a direction that is worth tracing, and the
+//! density of any other direction. The method is *Generalized Light Portals* (Ogaki, HPG 2020).
 //!
 //! # Example
 //!
@@ -19,82 +18,86 @@
 //!
 //! let mut builder = LightSampler::builder();
 //! let texture = builder.add_texture(Texture::new(1, 2, &luminance)?.filter(Filter::Nearest));
-//! builder.add_mesh(
-//!     &Mesh::emitter(&positions, &[[0, 1, 2], [0, 2, 3]]).uvs(&uvs).weight(Weight::Texture(texture)),
-//! )?;
-//! let lights = builder.build()?;
+//! let lights = builder
+//!     .mesh(&Mesh::emitter(&positions, &[[0, 1, 2], [0, 2, 3]]).uvs(&uvs).weight(Weight::Texture(texture)))?
+//!     .build()?;
 //!
-//! let x = ShadingPoint::surface(Vec3::ZERO, Vec3::Z);
-//! let sample = lights.sample(&x, [0.2, 0.7, 0.4]).expect("the lamp is above the floor");
+//! let here = lights.at(&ShadingPoint::surface(Vec3::ZERO, Vec3::Z));
+//! let sample = here.sample([0.2, 0.7, 0.4]).expect("the lamp is above the floor");
 //! assert!(sample.position.y > -1e-3);
-//! // The same density, had a ray hit the lamp by chance.
-//! assert!((lights.pdf(&x, &sample.hit) / sample.pdf - 1.0).abs() < 1e-5);
+//! // The same density, if a ray had hit the lamp by chance.
+//! assert!((here.pdf(&sample.hit) / sample.pdf - 1.0).abs() < 1e-5);
 //! # Ok::<(), fanlight::Error>(())
 //! ```
 //!
 //! # How to use it
 //!
-//! 1. Make a [`LightSampler::builder`], give it the [`Environment`], the [`Texture`]s or [`Procedural`]s and the [`Mesh`]es, and
-//!    build. Everything is checked here: what a builder accepted can always be sampled.
-//! 2. At a [`ShadingPoint`], call [`sample`](LightSampler::sample) with three random numbers and trace a ray. `None`
-//!    is a sample of zero.
-//!    With more than one question about a point, ask [`at`](LightSampler::at) it first.
-//! 3. Divide by the density that belongs to what was evaluated:
+//! 1. Start with [`LightSampler::builder`], add the [`Environment`], the [`Texture`]s or [`Procedural`]s and the
+//!    [`Mesh`]es, and build. Everything is checked here: what a builder accepted can always be sampled. Options and lights
+//!    chain into one expression; in loops, [`add_texture`](LightSamplerBuilder::add_texture) and
+//!    [`add_mesh`](LightSamplerBuilder::add_mesh) return a [`TextureId`] and a [`MeshId`].
+//! 2. Call [`LightSampler::at`] with a [`ShadingPoint`]. It returns the [`PointSampler`] that answers all calls at that
+//!    point.
+//! 3. Call [`sample`](PointSampler::sample) with three random numbers and trace a ray. `None` is a sample of zero: divide
+//!    by the number of samples requested, not by the number returned.
+//! 4. Divide by the density that belongs to what was evaluated:
 //!
 //! | what the ray brings back | density |
 //! | --- | --- |
-//! | all that arrives along the direction, whatever it crosses | [`pdf_sample_direction`](LightSampler::pdf_sample_direction) |
+//! | everything that arrives along the direction, whatever it crosses | [`pdf_sample_direction`](PointSampler::pdf_sample_direction) |
 //! | the light of the sampled point alone, if nothing hides it | [`LightSample::pdf`] |
-//! | all that arrives along a direction from elsewhere (a BSDF, a path guide) | [`pdf_direction`](LightSampler::pdf_direction) |
-//! | the light of one point that was hit, and no other | [`pdf`](LightSampler::pdf) |
+//! | everything that arrives along a direction from elsewhere (a BSDF, a path guide) | [`pdf_direction`](PointSampler::pdf_direction) |
+//! | the light of one point that was hit, and no other | [`pdf`](PointSampler::pdf) |
 //!
-//! The first and the third go together in multiple importance sampling, and so do the second and the fourth. A
-//! portal does not end a ray: where a second portal may lie on the way, use the first and the third.
+//! The first and the third belong together in multiple importance sampling, and so do the second and the fourth. A portal
+//! does not end a ray: where a second portal may lie on the way, use the first and the third.
 //!
-//! Several calls at one point share work through [`LightSampler::at`]. Photons start with [`LightSampler::emission`];
-//! those of a point light are drawn with [`sample`](LightSampler::sample) from a [`ShadingPoint::volume`] at its place.
+//! Photons start with [`LightSampler::emission`]. For the photons of a point light, call [`sample`](PointSampler::sample)
+//! at a [`ShadingPoint::volume`] at its position.
 //!
-//! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them
-//! with BSDF samples, or with [`Environment::sample`].
+//! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
+//! BSDF samples, or with [`Environment::sample`].
+//!
+//! The repository has a guide for hosts, `docs/INTEGRATION.md`, with a table of mistakes and what they look like.
 //!
 //! # Scope and goals
 //!
 //! The crate chooses points on lights, and it computes the densities of its choices. Its goals, in this order:
 //!
-//! - **Unbiased.** The density is above zero wherever something can arrive: an average over texels may be small, but
-//!   it is zero only if all of them are black. Where nothing can arrive it is exactly zero.
-//! - **Safe for any input.** Bad input is an [`Error`] that names the mesh, the element and the value. No panic, NaN
-//!   or infinity comes out of sampling, and the only unsafe code selects vector instructions and
-//!   prefetches memory, in one module.
-//! - **Low noise, then speed.** No work is done for what the scene does not have.
+//! - **Unbiased.** The density is above zero wherever something can arrive: an average over texels may be small, but it is
+//!   zero only if all of them are black. Where nothing can arrive, the density is exactly zero.
+//! - **Safe for any input.** Bad input is an [`Error`] that names the mesh, the element and the value. Sampling never
+//!   panics and never returns NaN or infinity. The only unsafe code is in one module: it selects vector instructions,
+//!   prefetches memory and, without `std`, takes square roots.
+//! - **Low noise, then speed.** You pay only for what the scene has.
 //! - **Readable.** `docs/ARCHITECTURE.md` explains the algorithm before the code.
 //!
 //! Out of scope:
 //!
 //! - intersecting the host's scene, and visibility. (Rays are intersected with lights only, for the density of a
 //!   direction.)
-//! - colour. All weights are scalars, by which samples are placed; what a sample carries is the host's matter.
+//! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
 //! - punctual lights: points, spots and directions without an extent.
-//! - updates of a built sampler, except that the environment can be turned, and that lights can move and change their
+//! - updates of a built sampler, except that the environment can be rotated, and that lights can move and change their
 //!   brightness ([`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
 //!
 //! # Units and measures
 //!
-//! Lengths are in any unit, as long as it is the same everywhere; coordinates go up to 1e9. The weight of an emitter
-//! is its radiance, the weight of a portal its transmittance, and the environment holds radiance. Radiance is in any
-//! unit, too, but in the same one for emitters and environment, because they compete for samples.
+//! Lengths are in any unit, as long as it is the same everywhere; coordinates go up to 1e9. The weight of an emitter is its
+//! radiance, the weight of a portal its transmittance, and the environment holds radiance. Radiance is in any unit too, but
+//! in the same unit for emitters and environment, because they compete for samples.
 //!
-//! Densities are per solid angle at the shading point (1/sr) unless their name or their documentation says per area
-//! of the light. `pmf` is a probability, without a unit.
+//! Densities are per solid angle at the shading point (1/sr) unless their name or their documentation says per area of the
+//! light. `pmf` is a probability, without a unit.
 //!
 //! Directions point away from the shading point. The front of a triangle is the side from which its vertices run
-//! counter-clockwise; light leaves from the front, unless [`Sides::Two`] is asked for. The front of a portal faces
-//! the room.
+//! counter-clockwise; light leaves from the front only, unless the mesh has [`Sides::Two`]. The front of a portal faces the
+//! room.
 //!
-//! Random numbers are uniform in `[0, 1)`. Numbers that are well stratified give samples that are.
+//! Random numbers are uniform in `[0, 1)`. Well-stratified numbers give well-stratified samples.
 //!
 //! # Features
 //!
@@ -104,11 +107,10 @@
 //!
 //! # Without `std`
 //!
-//! The crate is `no_std` and depends on `alloc`. Building and loading allocate; sampling does not, with one exception:
-//! [`sample_split`](LightSampler::sample_split) appends to a `SmallVec`, which allocates if it is too small.
-//! [`LightSamplerView`] borrows all of its data: a sampler can be written with
-//! [`to_bytes`](LightSampler::to_bytes), mapped from a file, and read with
-//! [`from_bytes`](LightSamplerView::from_bytes) without a copy.
+//! The crate is `no_std` and depends on `alloc`. Building and loading allocate; sampling never does.
+//! ([`sample_split`](PointSampler::sample_split) extends a collection of the caller, which may allocate.)
+//! [`LightSamplerView`] borrows all of its data: a sampler can be written with [`to_bytes`](LightSampler::to_bytes), mapped
+//! from a file, and read with [`from_bytes`](LightSamplerView::from_bytes) without a copy.
 
 #![no_std]
 
