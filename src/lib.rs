@@ -33,13 +33,13 @@
 //! # How to use it
 //!
 //! 1. Start with [`LightSampler::builder`], add the [`Environment`], the [`Texture`]s or [`Procedural`]s and the
-//!    [`Mesh`]es, and build. Everything is checked here: what a builder accepted can always be sampled. Options and lights
-//!    chain into one expression; in loops, [`add_texture`](LightSamplerBuilder::add_texture) and
+//!    [`Mesh`]es, and build. Everything is checked here: what a builder accepted can always be sampled. Options and
+//!    lights chain into one expression; in loops, [`add_texture`](LightSamplerBuilder::add_texture) and
 //!    [`add_mesh`](LightSamplerBuilder::add_mesh) return a [`TextureId`] and a [`MeshId`].
 //! 2. Call [`LightSampler::at`] with a [`ShadingPoint`]. It returns the [`PointSampler`] that answers all calls at that
 //!    point.
-//! 3. Call [`sample`](PointSampler::sample) with three random numbers and trace a ray. `None` is a sample of zero: divide
-//!    by the number of samples requested, not by the number returned.
+//! 3. Call [`sample`](PointSampler::sample) with three random numbers and trace a ray. `None` is a sample of zero:
+//!    divide by the number of samples requested, not by the number returned.
 //! 4. Divide by the density that belongs to what was evaluated:
 //!
 //! | what the ray brings back | density |
@@ -49,11 +49,11 @@
 //! | everything that arrives along a direction from elsewhere (a BSDF, a path guide) | [`pdf_direction`](PointSampler::pdf_direction) |
 //! | the light of one point that was hit, and no other | [`pdf`](PointSampler::pdf) |
 //!
-//! The first and the third belong together in multiple importance sampling, and so do the second and the fourth. A portal
-//! does not end a ray: where a second portal may lie on the way, use the first and the third.
+//! The first and the third belong together in multiple importance sampling, and so do the second and the fourth. A
+//! portal does not end a ray: where a second portal may lie on the way, use the first and the third.
 //!
-//! Photons start with [`LightSampler::emission`]. For the photons of a point light, call [`sample`](PointSampler::sample)
-//! at a [`ShadingPoint::volume`] at its position.
+//! Photons start with [`LightSampler::emission`]. For the photons of a point light, call
+//! [`sample`](PointSampler::sample) at a [`ShadingPoint::volume`] at its position.
 //!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
 //! BSDF samples, or with [`Environment::sample`].
@@ -64,8 +64,8 @@
 //!
 //! The crate chooses points on lights, and it computes the densities of its choices. Its goals, in this order:
 //!
-//! - **Unbiased.** The density is above zero wherever something can arrive: an average over texels may be small, but it is
-//!   zero only if all of them are black. Where nothing can arrive, the density is exactly zero.
+//! - **Unbiased.** The density is above zero wherever something can arrive: an average over texels may be small, but it
+//!   is zero only if all of them are black. Where nothing can arrive, the density is exactly zero.
 //! - **Safe for any input.** Bad input is an [`Error`] that names the mesh, the element and the value. Sampling never
 //!   panics and never returns NaN or infinity. The only unsafe code is in one module: it selects vector instructions,
 //!   prefetches memory and, without `std`, takes square roots.
@@ -86,16 +86,16 @@
 //!
 //! # Units and measures
 //!
-//! Lengths are in any unit, as long as it is the same everywhere; coordinates go up to 1e9. The weight of an emitter is its
-//! radiance, the weight of a portal its transmittance, and the environment holds radiance. Radiance is in any unit too, but
-//! in the same unit for emitters and environment, because they compete for samples.
+//! Lengths are in any unit, as long as it is the same everywhere; coordinates go up to 1e9. The weight of an emitter is
+//! its radiance, the weight of a portal its transmittance, and the environment holds radiance. Radiance is in any unit
+//! too, but in the same unit for emitters and environment, because they compete for samples.
 //!
-//! Densities are per solid angle at the shading point (1/sr) unless their name or their documentation says per area of the
-//! light. `pmf` is a probability, without a unit.
+//! Densities are per solid angle at the shading point (1/sr) unless their name or their documentation says per area of
+//! the light. `pmf` is a probability, without a unit.
 //!
 //! Directions point away from the shading point. The front of a triangle is the side from which its vertices run
-//! counter-clockwise; light leaves from the front only, unless the mesh has [`Sides::Two`]. The front of a portal faces the
-//! room.
+//! counter-clockwise; light leaves from the front only, unless the mesh has [`Sides::Two`]. The front of a portal faces
+//! the room.
 //!
 //! Random numbers are uniform in `[0, 1)`. Well-stratified numbers give well-stratified samples.
 //!
@@ -109,8 +109,8 @@
 //!
 //! The crate is `no_std` and depends on `alloc`. Building and loading allocate; sampling never does.
 //! ([`sample_split`](PointSampler::sample_split) extends a collection of the caller, which may allocate.)
-//! [`LightSamplerView`] borrows all of its data: a sampler can be written with [`to_bytes`](LightSampler::to_bytes), mapped
-//! from a file, and read with [`from_bytes`](LightSamplerView::from_bytes) without a copy.
+//! [`LightSamplerView`] borrows all of its data: a sampler can be written with [`to_bytes`](LightSampler::to_bytes),
+//! mapped from a file, and read with [`from_bytes`](LightSamplerView::from_bytes) without a copy.
 
 #![no_std]
 
