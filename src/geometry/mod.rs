@@ -3,9 +3,11 @@
 mod aabb;
 mod cone;
 mod horizon;
+mod polygon;
 mod triangle;
 
 pub(crate) use aabb::Aabb;
 pub(crate) use cone::{Cone, angle};
 pub(crate) use horizon::{HORIZON_ROUNDING, horizon, is_below};
-pub(crate) use triangle::{Triangle, intersect, normal_and_area};
+pub(crate) use polygon::Polygon;
+pub(crate) use triangle::{Triangle, intersect, normal_and_area, subdivision_centers};

@@ -8,7 +8,7 @@ use core::ops::ControlFlow;
 use super::energy::{Energies, Scales};
 use super::lights::{LightSampler, NO_AREA, NO_LEAF};
 use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
-use crate::blas::{self, Function, Prepared, Procedural, Root, Texture};
+use crate::blas::{self, Procedural, RegisteredFunction, Root, Texture, TexturePyramid};
 use crate::env::Environment;
 use crate::error::{Error, Kind as ErrorKind};
 use crate::light::{Illumination, LightTriangle};
@@ -18,17 +18,17 @@ use crate::tlas::{self, MAX_LEAVES, Report};
 /// What a textured weight is read from.
 #[derive(Debug)]
 enum Surface<'a> {
-    Image(Prepared<'a>),
-    Function(Function<'a>),
+    Image(TexturePyramid<'a>),
+    Function(RegisteredFunction<'a>),
 }
 
 /// Collects the lights of a scene and builds a [`LightSampler`].
 ///
 /// Everything is checked when it is added; what was accepted can always be sampled. `N` is the arity of the tree
-/// over triangles (4, 8 or 16), `M` that of the trees over textures (4, 16 or 64).
+/// over triangles (4, 8 or 16).
 /// The wider a tree, the better its choices; on machines without AVX, 8 may be faster than the default of 16.
 #[derive(Debug)]
-pub struct LightSamplerBuilder<'a, const N: usize = 16, const M: usize = 4> {
+pub struct LightSamplerBuilder<'a, const N: usize = 16> {
     environment: Option<Environment>,
     illumination: Illumination,
     textures: Vec<Surface<'a>>,
@@ -38,18 +38,18 @@ pub struct LightSamplerBuilder<'a, const N: usize = 16, const M: usize = 4> {
     places: Vec<u32>,
     /// Where each mesh starts in `places`, and the end.
     meshes: Vec<u32>,
-    cells: Vec<blas::Block<M>>,
+    cells: Vec<blas::CellBlock>,
     /// Trees over textures by texture and the bits of the three uvs.
     shared: BTreeMap<(usize, [u32; 6]), Root>,
 }
 
-impl<const N: usize, const M: usize> Default for LightSamplerBuilder<'_, N, M> {
+impl<const N: usize> Default for LightSamplerBuilder<'_, N> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
+impl<'a, const N: usize> LightSamplerBuilder<'a, N> {
     /// A builder without lights, whose environment is white.
     pub fn new() -> Self {
         const { assert!(N == 4 || N == 8 || N == 16, "the arity of the tree over triangles is 4, 8 or 16") };
@@ -79,14 +79,14 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
 
     /// Adds a texture that meshes can refer to. Its texels are needed until [`Self::build`].
     pub fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
-        self.textures.push(Surface::Image(Prepared::new(texture)));
+        self.textures.push(Surface::Image(TexturePyramid::new(texture)));
         TextureId(self.textures.len() - 1)
     }
 
     /// Adds a function of texture coordinates that meshes can refer to like a texture. It is asked by
     /// [`Self::add_mesh`].
     pub fn add_procedural(&mut self, function: &'a dyn Procedural) -> TextureId {
-        self.textures.push(Surface::Function(Function::new(function)));
+        self.textures.push(Surface::Function(RegisteredFunction::new(function)));
         TextureId(self.textures.len() - 1)
     }
 
@@ -124,7 +124,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// # Errors
     ///
     /// If there are more triangles than the tree can number (2^28 - 1).
-    pub fn build(self) -> Result<LightSampler<N, M>, Error> {
+    pub fn build(self) -> Result<LightSampler<N>, Error> {
         self.build_reporting(None)
     }
 
@@ -136,11 +136,11 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// # Errors
     ///
     /// As [`Self::build`], and one of which [`Error::is_cancelled`] is true if `report` has cancelled the build.
-    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler<N, M>, Error> {
+    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler<N>, Error> {
         self.build_reporting(Some(&report))
     }
 
-    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N, M>, Error> {
+    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N>, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
         let energies = Energies::new(&environment, Scales::default());
         let sends = parallel::collect(self.triangles.len(), |i| energies.energy(&self.triangles[i]) > 0.0);
@@ -228,7 +228,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     }
 
     /// What guides the mesh, if that is a function.
-    fn function(&mut self, mesh: &Mesh<'_>) -> Option<&mut Function<'a>> {
+    fn function(&mut self, mesh: &Mesh<'_>) -> Option<&mut RegisteredFunction<'a>> {
         let Weight::Texture(TextureId(texture)) = mesh.weight else { return None };
         match &mut self.textures[texture] {
             Surface::Function(function) => Some(function),

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::lights::{LightSampler, LightSamplerView};
 use super::sample::{to_finite, to_positive};
-use crate::blas::{self, Cell, Domain, Draw, Follow, Guide, Lattice, Shape, Worth};
+use crate::blas::{self, CellTarget, CellWeight, Draw, Follow, Guide, Lattice, LatticeCell};
 use crate::env::Directions;
 use crate::geometry;
 use crate::light::LightTriangle;
@@ -47,8 +47,8 @@ pub struct EmissionSample {
 ///
 /// Made by [`LightSampler::emission`] in some microseconds; holds about 1.5 KB.
 #[derive(Clone, Debug)]
-pub struct Emission<'a, const N: usize = 16, const M: usize = 4> {
-    lights: LightSamplerView<'a, N, M>,
+pub struct Emission<'a, const N: usize = 16> {
+    lights: LightSamplerView<'a, N>,
     directions: Directions,
     /// Probabilities of a ray that does not depend on the direction, and of one from the environment's image.
     shares: [f64; 2],
@@ -57,23 +57,29 @@ pub struct Emission<'a, const N: usize = 16, const M: usize = 4> {
 /// A cell of the texture is as good as any other of the same average.
 struct Everywhere;
 
-impl Shape for Everywhere {
+impl CellTarget for Everywhere {
+    type Cell = ();
+
+    fn whole(&self) {}
+
+    fn child(&self, (): &(), _index: usize) {}
+
     #[inline]
-    fn worth(&self, _cell: &Cell) -> Worth {
-        Worth { weight: 1.0, uniform: true, even: true }
+    fn weigh(&self, _at: LatticeCell, (): &mut ()) -> CellWeight {
+        CellWeight { weight: 1.0, is_final: true }
     }
 }
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const N: usize> LightSampler<N> {
     /// See [`LightSamplerView::emission`].
-    pub fn emission(&self) -> Emission<'_, N, M> {
+    pub fn emission(&self) -> Emission<'_, N> {
         self.as_view().emission()
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+impl<'a, const N: usize> LightSamplerView<'a, N> {
     /// Prepares to draw rays of light. To be made anew once the environment was turned.
-    pub fn emission(&self) -> Emission<'a, N, M> {
+    pub fn emission(&self) -> Emission<'a, N> {
         let directions = Directions::new(&self.environment, |direction, radius| {
             let (sin, cos) = math::sin_cos(radius);
             self.outgoing(&self.beam(-direction, [sin, cos]))
@@ -109,7 +115,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     }
 }
 
-impl<const N: usize, const M: usize> Emission<'_, N, M> {
+impl<const N: usize> Emission<'_, N> {
     /// Draws a ray of light. `u` is uniform in `[0, 1)⁵`: the first chooses the triangle, the next two the point on it,
     /// the last two the direction.
     ///
@@ -227,15 +233,15 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
     }
 
     /// A point of a triangle by the averages of its texture, as a guide leads.
-    fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, Domain) -> Lattice) -> Option<Start> {
+    fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, LatticeCell) -> Lattice) -> Option<Start> {
         let light = &self.lights.triangles[leaf as usize];
         if self.lights.scale(light) == 0.0 {
             return None;
         }
         let triangle = light.triangle();
         let (normal, area) = triangle.normal_and_area()?;
-        let (cell, pmf) = blas::descend(self.lights.cells, light.root, [Vec3::ZERO; 3], &Everywhere, guide)?;
-        let place = point(guide, cell.domain);
+        let (cell, pmf) = blas::descend(self.lights.cells, light.root, &Everywhere, guide)?;
+        let place = point(guide, cell);
         let [b1, b2] = place.to_barycentrics().map(f64::from);
         let [v0, v1, v2] = triangle.exactly_relative_to(Vec3::ZERO);
         Some(Start {
@@ -243,7 +249,7 @@ impl<const N: usize, const M: usize> Emission<'_, N, M> {
             position: v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2,
             normal,
             two_sided: light.is_two_sided(),
-            pdf_area: pmf / (f64::from(area) * f64::from(cell.share())),
+            pdf_area: pmf / (f64::from(area) * f64::from(cell.area())),
         })
     }
 

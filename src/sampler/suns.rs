@@ -11,7 +11,7 @@ use glam::Vec3;
 use super::at::PointSampler;
 use super::lights::LightSamplerView;
 use super::techniques::{ANY, MAX_SEEN, Pairs, Seen, Techniques};
-use crate::blas::{self, Lattice, Shape};
+use crate::blas::{CellTarget, Lattice, LatticeCell};
 use crate::env::Sun;
 use crate::geometry;
 use crate::light::{Lit, Sunlit};
@@ -19,7 +19,7 @@ use crate::math;
 use crate::record::{Receiver, ShadingPoint};
 use crate::warp::Variate;
 
-impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
+impl<const N: usize> LightSamplerView<'_, N> {
     /// Whether suns may be seen through portals.
     #[inline]
     pub(super) fn has_suns(&self) -> bool {
@@ -44,7 +44,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     fn irradiance_from_one(&self, x: &ShadingPoint) -> f32 {
         let [light] = self.triangles else { return 0.0 };
         let Some(lit) = self.lit(0, x) else { return 0.0 };
-        PI * light.root.average * self.scale(light) * lit.worth(&blas::Cell::root(lit.vertices)).weight
+        PI * light.root.average * self.scale(light) * lit.weigh(LatticeCell::whole(), &mut lit.whole()).weight
     }
 
     /// Appends the portals that a sun is seen through.
@@ -110,7 +110,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     }
 }
 
-impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+impl<const N: usize> PointSampler<'_, N> {
     /// Draws a point on a portal towards a sun, by its place in the list.
     pub(super) fn sun_point(&self, index: usize, u: [Variate; 2]) -> Option<(u32, Lattice)> {
         let Seen { leaf, sun, part } = self.techniques.suns()?.seen(index);
