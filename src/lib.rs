@@ -127,6 +127,7 @@ mod parallel;
 mod record;
 mod sampler;
 mod simd;
+mod technique;
 #[cfg(test)]
 mod testing;
 mod tlas;
@@ -138,7 +139,7 @@ mod warp;
 struct Readme;
 
 pub use blas::{Procedural, Texture};
-pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSample, EnvironmentView, Sun, SunTexel};
+pub use env::{Environment, EnvironmentImage, EnvironmentSample, EnvironmentView, Poles};
 pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
@@ -149,6 +150,3 @@ pub use sampler::{
     Sides, TextureId, Weight,
 };
 pub use tlas::Splitting;
-/// For the benches: no part of the interface.
-#[doc(hidden)]
-pub use warp::equal_area::{sphere_to_square, square_to_sphere};

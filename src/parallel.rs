@@ -75,3 +75,21 @@ pub(crate) fn for_each<T: Send>(elements: &mut [T], size: usize, work: impl Fn(&
 pub(crate) fn for_each<T>(elements: &mut [T], _size: usize, work: impl Fn(&mut T)) {
     elements.iter_mut().for_each(work);
 }
+
+/// Passes every chunk of a slice to `work`, with the chunk's index. All chunks have `chunk_len` elements, which is above
+/// zero, but perhaps the last one.
+#[cfg(feature = "rayon")]
+pub(crate) fn for_each_chunk<T: Send>(
+    elements: &mut [T],
+    chunk_len: usize,
+    work: impl Fn(usize, &mut [T]) + Sync + Send,
+) {
+    use rayon::prelude::*;
+    elements.par_chunks_mut(chunk_len).enumerate().for_each(|(index, chunk)| work(index, chunk));
+}
+
+/// Passes every chunk of a slice to `work`, one after the other.
+#[cfg(not(feature = "rayon"))]
+pub(crate) fn for_each_chunk<T>(elements: &mut [T], chunk_len: usize, work: impl Fn(usize, &mut [T])) {
+    elements.chunks_mut(chunk_len).enumerate().for_each(|(index, chunk)| work(index, chunk));
+}

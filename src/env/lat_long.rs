@@ -10,7 +10,7 @@
 //! `r = R`, a meridian is `b = F r`.
 
 use super::polygon::Polygon;
-use super::source::Source;
+use super::source::EnvironmentSource;
 use crate::math::cos64;
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, SQRT_2};
@@ -20,7 +20,7 @@ const SLIVER: f64 = 1e-12;
 
 /// A latitude-longitude source, ready to be averaged over texels.
 pub(super) struct LatLong<'a> {
-    source: &'a Source,
+    source: &'a EnvironmentSource,
     /// Radii of the upper ends of the rows of a hemisphere, from the pole to the equator.
     radii: Vec<f64>,
     columns: usize,
@@ -45,7 +45,7 @@ struct Sums {
 }
 
 impl<'a> LatLong<'a> {
-    pub(super) fn new(source: &'a Source) -> Self {
+    pub(super) fn new(source: &'a EnvironmentSource) -> Self {
         let (columns, rows) = (source.columns(), source.rows());
         let half = rows.div_ceil(2);
         // √2 sin(θ/2) with θ = π j / rows; an odd middle row ends at the equator, r = 1.

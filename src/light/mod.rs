@@ -1,10 +1,8 @@
 //! Joins a triangle, its texture's tree and the environment into one target.
 
 mod illumination;
-mod sun;
 mod triangle;
 mod worth;
 
 pub use illumination::Illumination;
-pub(crate) use sun::{Part, Sunlit};
 pub(crate) use triangle::{LightTriangle, Lit, POSITION_LIMIT};

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::illumination::Views;
 use super::triangle::Lit;
 use crate::blas::{self, Cell, Parts, Shape, Worth, Worths};
-use crate::env::Footprint;
+use crate::env::DirectionCone;
 
 /// Ratio of squared radius to squared distance up to which the geometry is taken for the same all over a cell.
 const FAR: f32 = 1.0 / 16.0;
@@ -68,11 +68,11 @@ impl Lit<'_> {
                 continue;
             }
             let footprint = footprint(Vec3::new(x[i], y[i], z[i]), distance2[i], radius2, area * self.height);
-            let seen = environment.average(&footprint);
+            let seen = environment.estimate_radiance(&footprint);
             let one_texel = footprint.sin_radius < 1.0 && footprint.solid_angle <= environment.texel_solid_angle();
             weights[i] *= seen.value;
-            uniform[i] = one_texel || (seen.even && far[i]);
-            is_even[i] = one_texel || seen.even;
+            uniform[i] = one_texel || (seen.is_constant && far[i]);
+            is_even[i] = one_texel || seen.is_constant;
         }
         Worths { weights, uniform, even: is_even }
     }
@@ -133,9 +133,9 @@ impl Shape for Lit<'_> {
 
 /// The directions in which a cell is seen.
 #[inline]
-fn footprint(center: Vec3, distance2: f32, radius2: f32, area_by_height: f32) -> Footprint {
+fn footprint(center: Vec3, distance2: f32, radius2: f32, area_by_height: f32) -> DirectionCone {
     let inverse = 1.0 / crate::math::sqrt(distance2);
-    Footprint {
+    DirectionCone {
         direction: center * inverse,
         sin_radius: crate::math::sqrt(radius2) * inverse,
         solid_angle: area_by_height * inverse * inverse * inverse,

@@ -83,8 +83,8 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             bytemuck::cast_slice(environment.means),
             bytemuck::cast_slice(environment.ranges),
             bytemuck::cast_slice(environment.filtered_means),
-            bytemuck::cast_slice(environment.suns),
-            bytemuck::cast_slice(environment.sun_texels),
+            bytemuck::cast_slice(environment.features),
+            bytemuck::cast_slice(environment.feature_texels),
         ]
     }
 
@@ -135,8 +135,8 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
                 means: reader.slice("means", means)?,
                 ranges: reader.slice("ranges", ranges)?,
                 filtered_means: reader.slice("filtered means", filtered)?,
-                suns: reader.slice("suns", suns)?,
-                sun_texels: reader.slice("texels of suns", sun_texels)?,
+                features: reader.slice("bright features", suns)?,
+                feature_texels: reader.slice("texels of bright features", sun_texels)?,
             })?,
             energy: header.energy,
             portals: header.portals != 0,

@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use super::lights::{LightSampler, LightSamplerView};
 use super::sample::{to_finite, to_positive};
 use crate::blas::{self, Cell, Domain, Draw, Follow, Guide, Lattice, Shape, Worth};
-use crate::env::Directions;
+use crate::env::DirectionDistribution;
 use crate::geometry;
 use crate::light::LightTriangle;
 use crate::math;
@@ -49,7 +49,7 @@ pub struct EmissionSample {
 #[derive(Clone, Debug)]
 pub struct Emission<'a, const N: usize = 16, const M: usize = 4> {
     lights: LightSamplerView<'a, N, M>,
-    directions: Directions,
+    directions: DirectionDistribution,
     /// Probabilities of a ray that does not depend on the direction, and of one from the environment's image.
     shares: [f64; 2],
 }
@@ -74,12 +74,12 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
 impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     /// Prepares to draw rays of light. To be made anew once the environment was turned.
     pub fn emission(&self) -> Emission<'a, N, M> {
-        let directions = Directions::new(&self.environment, |direction, radius| {
+        let directions = DirectionDistribution::new(&self.environment, |direction, radius| {
             let (sin, cos) = math::sin_cos(radius);
             self.outgoing(&self.beam(-direction, [sin, cos]))
         });
         let diffuse = PI * self.outgoing(&Outgoing::Diffuse);
-        let mean = self.environment.mean_without_suns();
+        let mean = self.environment.mean_without_features();
         let is_image = !self.environment.is_constant() && mean > 0.0;
         let through = if is_image { directions.total() / mean } else { 0.0 };
         let total = f64::from(diffuse) + f64::from(through);

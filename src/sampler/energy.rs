@@ -45,7 +45,7 @@ pub(super) fn storable(energy: f64) -> f32 {
 
 impl<'a> Energies<'a> {
     pub(super) fn new(environment: &Environment, scales: Scales<'a>) -> Self {
-        Self { mean: f64::from(environment.mean_without_suns()), directional: !environment.is_constant(), scales }
+        Self { mean: f64::from(environment.mean_without_features()), directional: !environment.is_constant(), scales }
     }
 
     /// Energy of all triangles together.

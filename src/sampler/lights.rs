@@ -129,8 +129,8 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             + size_of_val(parts.means)
             + size_of_val(parts.ranges)
             + size_of_val(parts.filtered_means)
-            + size_of_val(parts.suns)
-            + size_of_val(parts.sun_texels);
+            + size_of_val(parts.features)
+            + size_of_val(parts.feature_texels);
         [tlas, triangles, size_of_val(self.cells), environment]
     }
 
@@ -193,13 +193,15 @@ pub(super) struct Scene<'a> {
 impl tlas::Scene for Scene<'_> {
     #[inline(always)]
     fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N] {
-        let mean = self.environment.mean_without_suns();
+        let mean = self.environment.mean_without_features();
         if mean <= 0.0 {
             return [0.0; N];
         }
         // What is not black stays so, however bright the rest is.
         let relative = |value: f32| only_if(value > 0.0, at_least(value / mean, f32::MIN_POSITIVE));
-        self.environment.averages_of_balls(centers, radii, set).map(relative)
+        let mut radiances = [0.0; N];
+        self.environment.radiances_of_balls(centers.each_ref().map(|axis| &axis[..]), radii, set, &mut radiances);
+        radiances.map(relative)
     }
 
     #[inline]

@@ -12,24 +12,25 @@ use super::at::PointSampler;
 use super::lights::LightSamplerView;
 use super::techniques::{ANY, MAX_SEEN, Pairs, Seen, Techniques};
 use crate::blas::{self, Lattice, Shape};
-use crate::env::Sun;
+use crate::env::BrightFeature;
 use crate::geometry;
-use crate::light::{Lit, Sunlit};
+use crate::light::Lit;
 use crate::math;
 use crate::record::{Receiver, ShadingPoint};
+use crate::technique::FeatureView;
 use crate::warp::Variate;
 
 impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     /// Whether suns may be seen through portals.
     #[inline]
     pub(super) fn has_suns(&self) -> bool {
-        !self.environment.suns().is_empty() && self.has_portals()
+        !self.environment.bright_features().is_empty() && self.has_portals()
     }
 
     /// What each technique is worth at a shading point, and the weights of the tree's first choice if that took them.
     pub(super) fn weigh(&self, x: &ShadingPoint) -> (Techniques, Option<[f32; N]>) {
         let mut pairs = Pairs::NONE;
-        for sun in 0..self.environment.suns().len() {
+        for sun in 0..self.environment.bright_features().len() {
             self.find(sun, x, &mut pairs);
         }
         let mut weights = None;
@@ -49,15 +50,15 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
 
     /// Appends the portals that a sun is seen through.
     fn find(&self, sun: usize, x: &ShadingPoint, pairs: &mut Pairs) {
-        let axis = self.environment.sun_axis(sun);
-        let Sun { sin_radius, power, .. } = self.environment.suns()[sun];
+        let axis = self.environment.feature_axis(sun);
+        let BrightFeature { sin_radius, power, .. } = self.environment.bright_features()[sun];
         let cosine = mean_cosine(x.receiver, axis, sin_radius);
         if cosine == 0.0 {
             return;
         }
         let start = pairs.len();
         // Every sun after this one keeps a place.
-        let end = MAX_SEEN - (self.environment.suns().len() - 1 - sun);
+        let end = MAX_SEEN - (self.environment.bright_features().len() - 1 - sun);
         let mut more = 0.0;
         let cone = [sin_radius, math::sqrt((1.0 - sin_radius * sin_radius).max(0.0))];
         self.tlas.meet(x.position, axis, cone, |leaf| {
@@ -86,8 +87,8 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         }
     }
 
-    fn sunlit<'s>(&'s self, lit: &'s Lit<'s>, sun: usize) -> Sunlit<'s> {
-        Sunlit { lit, environment: self.environment, sun }
+    fn sunlit<'s>(&'s self, lit: &'s Lit<'s>, sun: usize) -> FeatureView<'s> {
+        FeatureView { lit, environment: self.environment, feature: sun }
     }
 
     /// Of the portals that a ray crosses the one with the least number, and where.
@@ -116,7 +117,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
         let Seen { leaf, sun, part } = self.techniques.suns()?.seen(index);
         let (lights, sun) = (&self.lights, sun as usize);
         if leaf == ANY {
-            return lights.least_crossed(&self.x, lights.environment.sample_sun(sun, u));
+            return lights.least_crossed(&self.x, lights.environment.sample_feature(sun, u));
         }
         let lit = lights.lit(leaf, &self.x)?;
         Some((leaf, lights.sunlit(&lit, sun).sample(lights.cells, part, u)?))
@@ -134,8 +135,8 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
         let direction = lit.point(place).normalize_or_zero().as_vec3();
         let environment = &self.lights.environment;
         let mut pdf = 0.0;
-        for sun in 0..environment.suns().len() {
-            let excess = f64::from(environment.sun_excess(sun, direction));
+        for sun in 0..environment.bright_features().len() {
+            let excess = f64::from(environment.feature_excess(sun, direction));
             if excess == 0.0 {
                 continue;
             }
@@ -153,7 +154,7 @@ impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
         let (lights, sun) = (&self.lights, seen.sun as usize);
         if seen.leaf == ANY {
             let is_least = lights.least_crossed(&self.x, direction).is_some_and(|(least, _)| least == leaf);
-            return if is_least { 1.0 / f64::from(lights.environment.suns()[sun].power) } else { 0.0 };
+            return if is_least { 1.0 / f64::from(lights.environment.bright_features()[sun].power) } else { 0.0 };
         }
         lights.sunlit(lit, sun).pdf_per_excess(lights.cells, seen.part, place)
     }

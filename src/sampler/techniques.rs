@@ -1,13 +1,13 @@
 //! How often suns and trees are used at one shading point.
 
-use crate::env::MAX_SUNS;
-use crate::light::Part;
+use crate::env::MAX_FEATURES;
+use crate::technique::FeaturePart;
 use crate::warp::{Variate, pick, pick_pair, sum};
 
 /// Most pairs of a sun and a part of a portal that shows some of it. Of a sun with more, directions are drawn as if
 /// there were no walls.
 pub(super) const MAX_SEEN: usize = 64;
-const _: () = assert!(MAX_SEEN > MAX_SUNS);
+const _: () = assert!(MAX_SEEN > MAX_FEATURES);
 
 /// Stands for all portals.
 pub(super) const ANY: u32 = u32::MAX;
@@ -28,7 +28,7 @@ pub(super) struct Seen {
     /// Or [`ANY`].
     pub(super) leaf: u32,
     pub(super) sun: u32,
-    pub(super) part: Part,
+    pub(super) part: FeaturePart,
 }
 
 /// Suns through parts of portals.
@@ -65,7 +65,7 @@ pub(super) enum Technique {
 
 impl Pairs {
     pub(super) const NONE: Self = Self {
-        seen: [Seen { leaf: 0, sun: 0, part: Part::WHOLE }; MAX_SEEN],
+        seen: [Seen { leaf: 0, sun: 0, part: FeaturePart::WHOLE }; MAX_SEEN],
         weights: [0.0; MAX_SEEN],
         count: 0,
         is_close: false,
@@ -81,7 +81,7 @@ impl Pairs {
     }
 
     /// Appends a pair. There must be room for it.
-    pub(super) fn push(&mut self, leaf: u32, sun: usize, part: Part, weight: f32) {
+    pub(super) fn push(&mut self, leaf: u32, sun: usize, part: FeaturePart, weight: f32) {
         self.seen[self.count] = Seen { leaf, sun: sun as u32, part };
         self.weights[self.count] = weight;
         self.count += 1;
@@ -95,7 +95,7 @@ impl Pairs {
     /// Replaces all pairs from one on by the sun as such.
     pub(super) fn merge(&mut self, start: usize, sun: usize, weight: f32) {
         self.count = start;
-        self.push(ANY, sun, Part::WHOLE, weight);
+        self.push(ANY, sun, FeaturePart::WHOLE, weight);
     }
 
     /// Irradiance from all pairs from one on.

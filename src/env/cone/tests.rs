@@ -1,4 +1,4 @@
-//! The cover holds what it should.
+//! The bounds hold every direction of the cone.
 
 use super::*;
 use crate::env::Environment;
@@ -8,9 +8,9 @@ use crate::testing::Pcg32;
 use alloc::vec;
 use core::f32::consts::{FRAC_PI_2, PI, TAU};
 
-fn region(direction: Vec3, radius: f32) -> Footprint {
+fn region(direction: Vec3, radius: f32) -> DirectionCone {
     let sin_radius = if radius < FRAC_PI_2 { radius.sin() } else { 1.0 };
-    Footprint { direction, sin_radius, solid_angle: TAU * (1.0 - radius.cos()) }
+    DirectionCone { direction, sin_radius, solid_angle: TAU * (1.0 - radius.cos()) }
 }
 
 /// A direction inside of a cone: its rim and its axis are hit, too.
@@ -26,9 +26,9 @@ fn any_radius(pcg: &mut Pcg32) -> f32 {
 }
 
 impl EnvironmentView<'_> {
-    fn cover_of(&self, region: &Footprint) -> Cover {
+    fn bounds_of(&self, region: &DirectionCone) -> RadianceBounds {
         let center = sphere_to_square(to_local(&self.header.rotation, region.direction));
-        self.cover(center.x, center.y, region.sin_radius)
+        self.radiance_bounds(center.x, center.y, region.sin_radius)
     }
 }
 
@@ -54,7 +54,7 @@ fn logarithms_of_powers_of_two() {
 }
 
 #[test]
-fn the_cover_holds_every_direction_of_the_cone() {
+fn the_bounds_hold_every_direction_of_the_cone() {
     let mut pcg = Pcg32::new(31, 1);
     let mut environments = zoo();
     let fine = Environment::from_equal_area(512, &noise(512 * 512, 5), Filter::Nearest).unwrap();
@@ -70,13 +70,13 @@ fn the_cover_holds_every_direction_of_the_cone() {
             }
             let radius = any_radius(&mut pcg);
             let region = region(axis, radius);
-            let (cover, average) = (view.cover_of(&region), view.average(&region));
-            assert!(cover.min <= cover.mean * 1.000_001 && cover.mean <= cover.max * 1.000_001);
-            assert_eq!(average.value > 0.0, cover.max > 0.0);
-            assert_eq!(average.even, cover.min >= EVEN * cover.max);
+            let (bounds, estimate) = (view.bounds_of(&region), view.estimate_radiance(&region));
+            assert!(bounds.min <= bounds.mean * 1.000_001 && bounds.mean <= bounds.max * 1.000_001);
+            assert_eq!(estimate.value > 0.0, bounds.max > 0.0);
+            assert_eq!(estimate.is_constant, bounds.min >= CONSTANT_RATIO * bounds.max);
             for _ in 0..20 {
                 let radiance = view.radiance(inside(axis, radius, &mut pcg)).min(view.parts().header.cap);
-                assert!(cover.min <= radiance && radiance <= cover.max, "{axis} {radius}: {radiance}");
+                assert!(bounds.min <= radiance && radiance <= bounds.max, "{axis} {radius}: {radiance}");
             }
         }
     }
@@ -97,7 +97,10 @@ fn a_lit_texel_is_never_lost() {
                     // An axis such that the lit direction is inside of the cone, and a solid angle of any size.
                     let mut region = region(inside(lit, radius, &mut pcg), radius);
                     region.solid_angle *= pcg.next_f32();
-                    assert!(environment.as_view().average(&region).value > 0.0, "{x} {y} of {size}, {radius}");
+                    assert!(
+                        environment.as_view().estimate_radiance(&region).value > 0.0,
+                        "{x} {y} of {size}, {radius}"
+                    );
                 }
             }
         }
@@ -113,15 +116,15 @@ fn black_and_constant_regions_are_known() {
     let mut exact = 0;
     for _ in 0..10_000 {
         let axis = pcg.direction();
-        let average = view.average(&region(axis, 0.02));
+        let estimate = view.estimate_radiance(&region(axis, 0.02));
         if axis.z.abs() > 0.2 {
             exact += 1;
-            assert_eq!(average, Average { value: if axis.z > 0.0 { 2.0 } else { 0.0 }, even: true });
+            assert_eq!(estimate, RadianceEstimate { value: if axis.z > 0.0 { 2.0 } else { 0.0 }, is_constant: true });
         }
     }
     assert!(exact > 5000);
-    let whole = Average { value: 2.5, even: true };
-    assert_eq!(Environment::constant(2.5).unwrap().as_view().average(&region(Vec3::X, 4.0)), whole);
+    let whole = RadianceEstimate { value: 2.5, is_constant: true };
+    assert_eq!(Environment::constant(2.5).unwrap().as_view().estimate_radiance(&region(Vec3::X, 4.0)), whole);
 }
 
 #[test]
@@ -137,8 +140,8 @@ fn a_smooth_sky_is_estimated_well() {
     let mut pcg = Pcg32::new(34, 1);
     for _ in 0..10_000 {
         let axis = pcg.direction();
-        let average = environment.as_view().average(&region(axis, 0.05));
-        assert!((average.value / sky(axis) - 1.0).abs() < 0.15, "{axis}: {average:?}");
+        let estimate = environment.as_view().estimate_radiance(&region(axis, 0.05));
+        assert!((estimate.value / sky(axis) - 1.0).abs() < 0.15, "{axis}: {estimate:?}");
     }
 }
 
@@ -149,8 +152,8 @@ fn any_region_is_safe() {
         for a in odd {
             for b in odd {
                 for direction in [Vec3::new(a, b, 0.3), Vec3::splat(a), Vec3::X] {
-                    let region = Footprint { direction, sin_radius: b, solid_angle: a };
-                    let value = environment.as_view().average(&region).value;
+                    let region = DirectionCone { direction, sin_radius: b, solid_angle: a };
+                    let value = environment.as_view().estimate_radiance(&region).value;
                     assert!(value.is_finite() && value >= 0.0);
                 }
             }

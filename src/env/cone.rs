@@ -1,15 +1,15 @@
-//! How bright a region of directions is: an estimate that never calls a region black that is not.
+//! Radiance of a region of directions: an estimate that is zero only if all of the region is black.
 //!
-//! Two looks are taken. The *talk's* (Ogaki 2020, "MIP Maps for Environment Map"): the nearest texel of a 3x3
+//! The radiance is looked up twice. The *talk's* (Ogaki 2020, "MIP Maps for Environment Map"): the nearest texel of a 3x3
 //! filtered level whose filter is as large as the region's solid angle. It is the better estimate, but a texel
-//! of it may miss what lies in the region. The *cover*: at most 2x2 texels of a level that are sure to hold the
-//! whole region. It decides about black and constant, and adds a small share to the estimate so that nothing
-//! bright is lost.
+//! of it may miss what lies in the region. The *bounds*: at most 2x2 texels of a level that are sure to hold the
+//! whole region. They decide about black and constant, and their mean is a small share of the estimate so that
+//! nothing bright is lost.
 //!
-//! Why the cover covers: a geodesic from the region's centre to any of its points is at most as long as the
+//! Why these texels hold the region: a geodesic from the region's center to any of its points is at most as long as the
 //! region's angular radius ρ. Its image in the plane that is tiled by rotated copies of the square is a
 //! continuous path (`wrap_texel`), no coordinate of which moves by more than `STRETCH · ρ`. So the image ends in
-//! the box of that half side around the centre, and the texels that the box touches, wrapped, hold the point.
+//! the box of that half side around the center, and the texels that the box touches, wrapped, hold the point.
 
 use super::rotation::to_local;
 use super::view::EnvironmentView;
@@ -17,21 +17,34 @@ use crate::math;
 use crate::warp::equal_area::{SPHERE, STRETCH, sphere_to_square, wrap_texel_log2};
 use glam::Vec3;
 
-/// Share of the cover's mean in the estimate (or of a larger region's).
+/// Share of the mean of the bounds (or of a larger region) in an estimate. *Measured* on the window scenes of the bench
+/// `quality`.
 ///
-/// The variance that a bright spot causes which the talk's look-up misses grows with its inverse; where that
-/// look-up is right, it costs its share of the samples.
-pub(super) const DEFENSIVE: f32 = 0.02;
+/// Larger: where the talk's lookup is right, more of the samples go astray, by this share. Smaller: the variance of a
+/// bright spot that the talk's lookup misses grows with the inverse of this share.
+pub(super) const DEFENSIVE_SHARE: f32 = 0.02;
 
-/// Ratio of least to largest radiance from which a region counts as even.
-const EVEN: f32 = 0.6;
+/// Ratio of least to largest radiance from which a region counts as constant. *Measured* on the window scenes of the
+/// bench `quality`.
+///
+/// Larger: the descent divides more cells, at the cost of time. Smaller: less of the contrast is followed.
+const CONSTANT_RATIO: f32 = 0.6;
 
-/// Slack of the box for the rounding of the map (2.5e-7 at worst), of the rotation and of the direction.
-const ROUNDING: f32 = 1e-6;
+/// Slack of the box for rounding, in units of the square. *Proved*: covers the errors of the map (2.5e-7 at worst), of
+/// the rotation and of the direction.
+///
+/// Larger: coarser bounds of the smallest regions. Smaller: a lit texel could be missed.
+const CONE_ROUNDING: f32 = 1e-6;
+
+/// Factor on the side of the box when a level is chosen. *Proved*: where the box is as wide as a texel, rounding (1e-7
+/// relative) could make it touch three texels instead of two.
+///
+/// Larger: a coarser level than necessary. Smaller: more than 2x2 texels.
+const SIDE_SLACK: f32 = 1.002;
 
 /// A region of directions.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Footprint {
+pub(crate) struct DirectionCone {
     /// Unit world direction of the axis of a cone that holds the region.
     pub(crate) direction: Vec3,
     /// Sine of the cone's angular radius. From 1 on it holds everything.
@@ -40,8 +53,8 @@ pub(crate) struct Footprint {
     pub(crate) solid_angle: f32,
 }
 
-impl Footprint {
-    /// The directions to a ball with this centre, relative to the viewer, and radius.
+impl DirectionCone {
+    /// Returns the directions to a ball with this center, relative to the viewer, and radius.
     #[inline(always)]
     pub(crate) fn ball(center: Vec3, radius: f32) -> Self {
         let inverse = 1.0 / math::sqrt(center.length_squared().max(f32::MIN_POSITIVE));
@@ -52,57 +65,52 @@ impl Footprint {
     }
 }
 
-/// How bright a region is.
+/// Estimate of how bright a region is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Average {
+pub(crate) struct RadianceEstimate {
     /// Estimate of the mean radiance. Zero only if the whole region is black.
     pub(crate) value: f32,
-    /// Whether the region is known to have no contrast worth a closer look: none at all, or at most that of 3 to 5.
-    pub(crate) even: bool,
+    /// Whether the radiance is known to be nearly constant: its least value is at least [`CONSTANT_RATIO`] of its
+    /// largest one.
+    pub(crate) is_constant: bool,
 }
 
-/// What is known of a region by a few texels that hold it.
-struct Cover {
+/// Bounds of the radiance in a region, by a few texels that hold the region.
+struct RadianceBounds {
     mean: f32,
     min: f32,
     max: f32,
 }
 
 impl EnvironmentView<'_> {
-    /// Estimates the mean radiance of a cone around a unit vector. For the benches: no part of the interface.
-    #[doc(hidden)]
-    pub fn radiance_of_cone(&self, direction: Vec3, sin_radius: f32) -> f32 {
-        self.average(&Footprint::ball(direction, sin_radius)).value
-    }
-
     /// Estimates the mean radiance of a region.
     #[inline]
-    pub(crate) fn average(&self, region: &Footprint) -> Average {
+    pub(crate) fn estimate_radiance(&self, region: &DirectionCone) -> RadianceEstimate {
         if self.is_constant() {
-            return Average { value: self.header.mean, even: true };
+            return RadianceEstimate { value: self.header.mean, is_constant: true };
         }
         let center = sphere_to_square(to_local(&self.header.rotation, region.direction));
-        let cover = self.cover(center.x, center.y, region.sin_radius);
-        if cover.min == cover.max {
-            return Average { value: cover.max, even: true };
+        let bounds = self.radiance_bounds(center.x, center.y, region.sin_radius);
+        if bounds.min == bounds.max {
+            return RadianceEstimate { value: bounds.max, is_constant: true };
         }
         let depth = self.depth_of_solid_angle(region.solid_angle);
         let scale = (1_u32 << depth) as f32;
         let last = (1 << depth) - 1;
         let (x, y) = (((center.x * scale) as u32).min(last), ((center.y * scale) as u32).min(last));
         let talk = self.filtered_at(depth, x, y);
-        let value = (1.0 - DEFENSIVE) * talk + DEFENSIVE * cover.mean;
-        Average { value: value.max(f32::MIN_POSITIVE), even: cover.min >= EVEN * cover.max }
+        let value = (1.0 - DEFENSIVE_SHARE) * talk + DEFENSIVE_SHARE * bounds.mean;
+        RadianceEstimate { value: value.max(f32::MIN_POSITIVE), is_constant: bounds.min >= CONSTANT_RATIO * bounds.max }
     }
 
-    /// Mean, minimum and maximum over texels that hold a cone around a point of the square.
+    /// Returns the mean, minimum and maximum over texels that hold a cone around a point of the square.
     #[inline]
-    fn cover(&self, x: f32, y: f32, sin_radius: f32) -> Cover {
-        let half = STRETCH * asin_bound(sin_radius) + ROUNDING;
+    fn radiance_bounds(&self, x: f32, y: f32, sin_radius: f32) -> RadianceBounds {
+        let half = STRETCH * asin_bound(sin_radius) + CONE_ROUNDING;
         let depth = self.depth_of_side(2.0 * half);
         if depth == 0 {
             let [min, max] = self.ranges[0];
-            return Cover { mean: self.mean_without_suns(), min, max };
+            return RadianceBounds { mean: self.mean_without_features(), min, max };
         }
         let size = 1_i32 << depth;
         let scale = size as f32;
@@ -121,15 +129,15 @@ impl EnvironmentView<'_> {
                 count += 1.0;
             }
         }
-        // The filter reaches beyond the cover.
-        Cover { mean: (sum / count).clamp(min, max), min, max }
+        // The filter reaches beyond the texels.
+        RadianceBounds { mean: (sum / count).clamp(min, max), min, max }
     }
 
     /// Depth of the finest level whose texels are at least as wide as `side`, so that it touches 2x2 at most.
     #[inline]
     fn depth_of_side(&self, side: f32) -> u32 {
         // A little more than `side`: where both are equal, rounding could make it three texels.
-        floor_log2(1.0 / (1.002 * side)).clamp(0, self.header.depth as i32) as u32
+        floor_log2(1.0 / (SIDE_SLACK * side)).clamp(0, self.header.depth as i32) as u32
     }
 
     /// Depth of the level whose 3x3 filter is nearest to a solid angle, Ω = min(4π, 9 · 4π / 4^depth).
