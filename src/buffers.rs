@@ -208,20 +208,22 @@ impl<'a> Sections<'a> {
 macro_rules! buffers {
     (
         $(#[$attribute:meta])*
-        $owner:ident, $view:ident
+        $visibility:vis $owner:ident,
+        $(#[$view_attribute:meta])*
+        $view:ident
         plain { $($(#[$plain_attribute:meta])* $plain:ident: $plain_type:ty,)* }
         buffers { $($(#[$buffer_attribute:meta])* $buffer:ident: $element:ty = $tag:literal version $version:literal,)* }
     ) => {
         $(#[$attribute])*
         #[derive(Clone, PartialEq)]
-        pub(crate) struct $owner {
+        $visibility struct $owner {
             $($(#[$plain_attribute])* pub(crate) $plain: $plain_type,)*
             $($(#[$buffer_attribute])* pub(crate) $buffer: alloc::vec::Vec<$element>,)*
         }
 
-        $(#[$attribute])*
+        $(#[$view_attribute])*
         #[derive(Clone, Copy)]
-        pub(crate) struct $view<'a> {
+        $visibility struct $view<'a> {
             $($(#[$plain_attribute])* pub(crate) $plain: $plain_type,)*
             $($(#[$buffer_attribute])* pub(crate) $buffer: &'a [$element],)*
         }
@@ -281,7 +283,9 @@ mod tests {
 
     buffers! {
         /// Two buffers.
-        Pair, PairView
+        pub(crate) Pair,
+        /// Two borrowed buffers.
+        PairView
         plain {
             /// A number.
             count: u32,

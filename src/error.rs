@@ -7,24 +7,24 @@ use core::fmt;
 /// The kinds are private, so that new ones can be added; the message names the mesh, the element, the value
 /// and the limit that it broke.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Error(pub(crate) Kind);
+pub struct Error(pub(crate) ErrorKind);
 
 impl Error {
     /// Whether it is no mistake but the host's own wish, given by what it passed to
     /// [`build_with`](crate::LightSamplerBuilder::build_with).
     pub fn is_cancelled(&self) -> bool {
-        self.0 == Kind::Cancelled
+        self.0 == ErrorKind::Cancelled
     }
 
     /// Bytes that hold, in the element `at` or at that offset, something else than they should.
     pub(crate) fn bytes(what: &'static str, at: usize, found: impl TryInto<u64>, expected: impl TryInto<u64>) -> Self {
         let (found, expected) = (found.try_into().unwrap_or(u64::MAX), expected.try_into().unwrap_or(u64::MAX));
-        Self(Kind::Bytes { what, at, found, expected })
+        Self(ErrorKind::Bytes { what, at, found, expected })
     }
 
     /// A section of bytes whose version this build does not read.
     pub(crate) fn section(what: &'static str, found: u32, expected: u32) -> Self {
-        Self(Kind::SectionVersion { what, found, expected })
+        Self(ErrorKind::SectionVersion { what, found, expected })
     }
 
     /// `Ok` if a count that bytes hold is the expected one.
@@ -35,7 +35,7 @@ impl Error {
 
 /// What went wrong, with everything that the message says.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Kind {
+pub(crate) enum ErrorKind {
     /// An image without texels, or with more than an index can hold.
     ImageSize { what: &'static str, width: usize, height: usize, limit: usize },
     /// The number of texels is not width times height.
@@ -83,61 +83,69 @@ pub(crate) enum Kind {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.0 {
-            Kind::ImageSize { what, width, height, limit } => {
+            ErrorKind::ImageSize { what, width, height, limit } => {
                 write!(f, "{what}: {width} x {height} texels, but each side must be from 1 to {limit}")
             }
-            Kind::TexelCount { what, width, height, found } => {
+            ErrorKind::TexelCount { what, width, height, found } => {
                 write!(f, "{what}: {found} texels given for {width} x {height}")
             }
-            Kind::Texel { what, x, y, value } => {
+            ErrorKind::Texel { what, x, y, value } => {
                 write!(f, "{what}: texel ({x}, {y}) is {value}, but must be finite and not negative")
             }
-            Kind::TexelTooBright { what, x, y, value, limit } => {
+            ErrorKind::TexelTooBright { what, x, y, value, limit } => {
                 write!(f, "{what}: texel ({x}, {y}) is {value:e}, but must be at most {limit:e}")
             }
-            Kind::Scalar { what, value, expected } => write!(f, "{what} is {value}, but must be {expected}"),
-            Kind::Rotation { determinant } => {
+            ErrorKind::Scalar { what, value, expected } => write!(f, "{what} is {value}, but must be {expected}"),
+            ErrorKind::Rotation { determinant } => {
                 write!(f, "environment: the rotation is not orthonormal (determinant {determinant}, must be 1)")
             }
-            Kind::Position { mesh, vertex, value: [x, y, z], limit } => {
+            ErrorKind::Position { mesh, vertex, value: [x, y, z], limit } => {
                 write!(f, "mesh {mesh}: vertex {vertex} is at ({x}, {y}, {z}), but must be finite and within {limit:e}")
             }
-            Kind::TextureCoordinate { mesh, vertex, value: [u, v], limit } => {
+            ErrorKind::TextureCoordinate { mesh, vertex, value: [u, v], limit } => {
                 write!(f, "mesh {mesh}: vertex {vertex} has uv ({u}, {v}), but must be finite and within {limit:e}")
             }
-            Kind::Index { mesh, triangle, index, vertices } => {
+            ErrorKind::Index { mesh, triangle, index, vertices } => {
                 write!(f, "mesh {mesh}: triangle {triangle} uses vertex {index}, but there are {vertices}")
             }
-            Kind::TextureCoordinateCount { mesh, found, vertices } => {
+            ErrorKind::TextureCoordinateCount { mesh, found, vertices } => {
                 write!(f, "mesh {mesh}: its weight is a texture, but it has {found} uvs for {vertices} vertices")
             }
-            Kind::Weight { mesh, value, limit } => {
+            ErrorKind::Weight { mesh, value, limit } => {
                 write!(f, "mesh {mesh}: the weight is {value}, but must be from 0 to {limit:e}")
             }
-            Kind::ProceduralBounds { mesh, region: [[u0, v0], [u1, v1]], bounds: [min, max] } => {
+            ErrorKind::ProceduralBounds { mesh, region: [[u0, v0], [u1, v1]], bounds: [min, max] } => {
                 write!(f, "mesh {mesh}: the bounds of its weight over uv ({u0}, {v0}) to ({u1}, {v1}) are {min} and ")?;
                 write!(f, "{max}, but must be finite, not negative and in this order")
             }
-            Kind::ProceduralWeight { mesh, uv: [u, v], value, region: [[u0, v0], [u1, v1]], bounds: [min, max] } => {
+            ErrorKind::ProceduralWeight {
+                mesh,
+                uv: [u, v],
+                value,
+                region: [[u0, v0], [u1, v1]],
+                bounds: [min, max],
+            } => {
                 write!(f, "mesh {mesh}: the weight at uv ({u}, {v}) is {value}, but its bounds over uv ")?;
                 write!(f, "({u0}, {v0}) to ({u1}, {v1}) are {min} and {max}")
             }
-            Kind::UnknownTexture { mesh, texture, textures } => {
+            ErrorKind::UnknownTexture { mesh, texture, textures } => {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")
             }
-            Kind::UnknownMesh { mesh, meshes } => write!(f, "mesh {mesh} was never added, this sampler has {meshes}"),
-            Kind::TriangleCount { mesh, found, expected } => {
+            ErrorKind::UnknownMesh { mesh, meshes } => {
+                write!(f, "mesh {mesh} was never added, this sampler has {meshes}")
+            }
+            ErrorKind::TriangleCount { mesh, found, expected } => {
                 write!(f, "mesh {mesh}: {found} triangles given, but it was added with {expected}")
             }
-            Kind::Revived { mesh, triangle } => {
+            ErrorKind::Revived { mesh, triangle } => {
                 write!(f, "mesh {mesh}: triangle {triangle} has an area now, but had none when the sampler was built")
             }
-            Kind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
-            Kind::Cancelled => write!(f, "the build was cancelled"),
-            Kind::SectionVersion { what, found, expected } => {
+            ErrorKind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
+            ErrorKind::Cancelled => write!(f, "the build was cancelled"),
+            ErrorKind::SectionVersion { what, found, expected } => {
                 write!(f, "bytes: section `{what}` has version {found}, but this build reads version {expected}")
             }
-            Kind::Bytes { what, at, found, expected } => {
+            ErrorKind::Bytes { what, at, found, expected } => {
                 write!(f, "bytes: {what} at {at} is {found:#x}, expected {expected:#x}")
             }
         }

@@ -131,6 +131,7 @@ mod receiver;
 mod record;
 mod sampler;
 mod simd;
+mod technique;
 #[cfg(test)]
 mod testing;
 mod tlas;
@@ -142,18 +143,14 @@ mod warp;
 struct Readme;
 
 pub use blas::{Procedural, Texture};
-pub use env::{Environment, EnvironmentHeader, EnvironmentParts, EnvironmentSample, EnvironmentView, Sun, SunTexel};
+pub use env::{Environment, EnvironmentImage, EnvironmentSample, EnvironmentView, Poles};
 pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
-pub use light::Illumination;
+pub use light::{Illumination, Mesh, MeshUpdate, Sides, Weight};
 pub use receiver::{Receiver, ShadingPoint};
-pub use record::{Filter, Hit, LightSample, TriangleId, Wrap};
+pub use record::{Filter, Hit, LightSample, MeshId, TextureId, TriangleId, Wrap};
 pub use sampler::{
-    Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, PointSampler,
-    Sides, TextureId, Weight,
+    ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
 };
-pub use tlas::Splitting;
-/// For the benches: no part of the interface.
-#[doc(hidden)]
-pub use warp::equal_area::{sphere_to_square, square_to_sphere};
+pub use tlas::{Arity, Splitting};

@@ -48,6 +48,20 @@ pub(crate) fn reduce<T: Sync, R: Send>(
     results.fold(first, merge)
 }
 
+/// Returns the sum of `element(0..count)`.
+pub(crate) fn sum(count: usize, element: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
+    let part = |chunk: usize| (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).map(&element).sum::<f64>();
+    let chunks = count.div_ceil(CHUNK);
+    #[cfg(feature = "rayon")]
+    let parts: Vec<f64> = {
+        use rayon::prelude::*;
+        (0..chunks).into_par_iter().map(part).collect()
+    };
+    #[cfg(not(feature = "rayon"))]
+    let parts: Vec<f64> = (0..chunks).map(part).collect();
+    parts.into_iter().sum()
+}
+
 /// `element(0..count)` as an array.
 pub(crate) fn collect<T: Send>(count: usize, element: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
     #[cfg(feature = "rayon")]
@@ -91,4 +105,22 @@ pub(crate) fn map<T: Sync, R: Send, F: Send>(
         return mapped.into_iter().collect();
     }
     items.iter().map(map).collect()
+}
+
+/// Passes every chunk of a slice to `work`, with the chunk's index. All chunks have `chunk_len` elements, which is above
+/// zero, but perhaps the last one.
+#[cfg(feature = "rayon")]
+pub(crate) fn for_each_chunk<T: Send>(
+    elements: &mut [T],
+    chunk_len: usize,
+    work: impl Fn(usize, &mut [T]) + Sync + Send,
+) {
+    use rayon::prelude::*;
+    elements.par_chunks_mut(chunk_len).enumerate().for_each(|(index, chunk)| work(index, chunk));
+}
+
+/// Passes every chunk of a slice to `work`, one after the other.
+#[cfg(not(feature = "rayon"))]
+pub(crate) fn for_each_chunk<T>(elements: &mut [T], chunk_len: usize, work: impl Fn(usize, &mut [T])) {
+    elements.chunks_mut(chunk_len).enumerate().for_each(|(index, chunk)| work(index, chunk));
 }

@@ -10,8 +10,8 @@ use common::lights::{ARITIES, aligned, build};
 use common::pcg::Pcg32;
 use common::scene::{Content, Scene};
 use fanlight::{
-    Environment, Error, Filter, Hit, LightSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Receiver,
-    ShadingPoint, Splitting, Texture, TextureId, TriangleId, Weight,
+    Environment, EnvironmentImage, Error, Filter, Hit, LightSample, LightSampler, LightSamplerBuilder,
+    LightSamplerView, Mesh, Receiver, ShadingPoint, Splitting, Texture, TextureId, TriangleId, Weight,
 };
 use glam::{Mat3, Vec2, Vec3};
 use smallvec::SmallVec;
@@ -51,9 +51,9 @@ fn environments() {
     type Build = fn(usize, usize, &[f32]) -> Result<Environment, Error>;
     let builds: [Build; 4] = [
         |w, h, texels| Environment::from_lat_long(w, h, texels, Filter::Nearest),
-        |w, h, texels| Environment::from_lat_long_with_size(w, h, texels, Filter::Bilinear, 4),
+        |w, h, texels| Environment::new(&EnvironmentImage::lat_long(w, h, texels).resolution(4)),
         |w, _, texels| Environment::from_equal_area(w, texels, Filter::Bilinear),
-        |w, _, texels| Environment::from_equal_area_with_size(w, texels, Filter::Nearest, 4),
+        |w, _, texels| Environment::new(&EnvironmentImage::equal_area(w, texels).filter(Filter::Nearest).resolution(4)),
     ];
     for build in builds {
         assert_error("no texels", build(0, 0, &[]), &["environment", "0 x 0", "65536"]);
@@ -70,9 +70,9 @@ fn environments() {
     for size in [0, 8193] {
         let number = size.to_string();
         let texels = [1.0; 4];
-        let result = Environment::from_lat_long_with_size(2, 2, &texels, Filter::Nearest, size);
+        let result = Environment::new(&EnvironmentImage::lat_long(2, 2, &texels).resolution(size));
         assert_error("resolution", result, &["environment", &number, "8192"]);
-        let result = Environment::from_equal_area_with_size(2, &texels, Filter::Nearest, size);
+        let result = Environment::new(&EnvironmentImage::equal_area(2, &texels).resolution(size));
         assert_error("resolution", result, &["environment", &number, "8192"]);
     }
 }

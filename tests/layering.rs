@@ -4,11 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules by level. Those of one level never import each other.
-const LEVELS: [&[&str]; 5] = [
+const LEVELS: [&[&str]; 6] = [
     &["error", "math", "simd", "geometry", "parallel"],
-    &["record", "bounds", "warp"],
+    &["record", "receiver", "bounds", "warp"],
     &["env", "blas", "tlas"],
     &["light"],
+    &["technique"],
     &["sampler"],
 ];
 /// The float functions stand in for those of the standard library, so geometry may have them although it is a sibling,

@@ -222,7 +222,6 @@ fn suns_are_seen_through_the_portals_that_are_on() {
     let mut texels = vec![1.0f32; 64 * 32];
     texels[3 * 64 + 10] = 5000.0;
     let sky = Environment::from_lat_long(64, 32, &texels, Filter::Nearest).expect("the sky is valid");
-    assert_eq!(sky.as_view().suns().len(), 1);
     let (phi, theta) = (core::f32::consts::TAU * 10.5 / 64.0, core::f32::consts::PI * 3.5 / 32.0);
     let sun = Vec3::new(phi.cos() * theta.sin(), -phi.sin() * theta.sin(), theta.cos());
     let side = sun.any_orthonormal_vector();

@@ -8,12 +8,13 @@ use crate::warp::pick_pair;
 use crate::warp::variate::{Variate, seed};
 use glam::{Vec2, Vec3};
 
-/// How close to its texel's edge a sample may come, in units of the square.
+/// Least distance of a sample from its texel's edge, in units of the square. *Proved*: twice what the way to the
+/// sphere, through the rotation and back can move a point, so that the direction of a sample falls into the texel that
+/// it was drawn from.
 ///
-/// Twice what the way to the sphere, through the rotation and back can move a point: the direction of a sample
-/// falls into the texel that it was drawn from. The samples that are moved for it are moved by less than 3e-6
-/// radians.
-const MARGIN: f32 = 1e-6;
+/// Larger: samples near an edge are moved farther; at this value by less than 3e-6 radians. Smaller: the density of a
+/// sample could be that of the next texel.
+const TEXEL_INSET: f32 = 1e-6;
 
 /// A direction drawn from the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +78,7 @@ impl EnvironmentView<'_> {
 pub(super) fn inside(depth: u32, texel: u32, place: f32) -> f32 {
     let side = 1.0 / (1_u32 << depth) as f32;
     let low = texel as f32 * side;
-    ((texel as f32 + place) * side).max(low + MARGIN).min(low + side - MARGIN)
+    ((texel as f32 + place) * side).max(low + TEXEL_INSET).min(low + side - TEXEL_INSET)
 }
 
 /// Chooses one of the four texels below a texel in proportion to their weights: the second variate the row, the

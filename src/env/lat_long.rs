@@ -9,7 +9,7 @@
 //! Coordinates here are `[r, b]` with b = r f, a shear of the octant's triangle that keeps areas: a parallel is
 //! `r = R`, a meridian is `b = F r`.
 
-use super::source::Source;
+use super::source::EnvironmentSource;
 use crate::geometry;
 use crate::math::cos64;
 use alloc::vec::Vec;
@@ -23,7 +23,7 @@ type Polygon = geometry::Polygon<f64, 12>;
 
 /// A latitude-longitude source, ready to be averaged over texels.
 pub(super) struct LatLong<'a> {
-    source: &'a Source,
+    source: &'a EnvironmentSource,
     /// Radii of the upper ends of the rows of a hemisphere, from the pole to the equator.
     radii: Vec<f64>,
     columns: usize,
@@ -48,7 +48,7 @@ struct Sums {
 }
 
 impl<'a> LatLong<'a> {
-    pub(super) fn new(source: &'a Source) -> Self {
+    pub(super) fn new(source: &'a EnvironmentSource) -> Self {
         let (columns, rows) = (source.columns(), source.rows());
         let half = rows.div_ceil(2);
         // √2 sin(θ/2) with θ = π j / rows; an odd middle row ends at the equator, r = 1.

@@ -4,46 +4,47 @@
 //! filtered means, and answers three questions: how bright a direction is, how bright a region of directions is
 //! (conservatively, for portals), and which direction to trace.
 
-mod balls;
 mod build;
-mod clipped_square;
+mod cone;
+mod cones;
 mod descend;
-mod directions;
-mod footprint;
+mod feature_sampling;
+mod feature_texel;
+mod features;
+mod image;
 mod lat_long;
-mod opening;
-mod parts;
 mod pyramid;
 mod resample;
 mod rotation;
 mod source;
-mod suns;
 #[cfg(test)]
 mod tests;
-mod texel;
+mod validate;
 mod view;
+mod weighted;
 
-pub use build::Environment;
+pub(crate) use cone::DirectionCone;
 pub use descend::EnvironmentSample;
-pub(crate) use directions::Directions;
-pub(crate) use footprint::Footprint;
-pub(crate) use opening::{Cover, Opening};
-pub use parts::EnvironmentParts;
-pub(crate) use suns::MAX_SUNS;
-pub use suns::Sun;
-pub use texel::SunTexel;
-pub use view::{EnvironmentHeader, EnvironmentView};
+pub(crate) use feature_texel::FeatureTexel;
+pub(crate) use features::BrightFeature;
+pub use image::{EnvironmentImage, Poles};
+pub use view::{Environment, EnvironmentView};
+pub(crate) use weighted::DirectionDistribution;
 
-/// Largest radiance of a texel. What is brighter is refused.
+/// Largest radiance of a texel. What is brighter is refused. *Format*: loaded texels are checked against it.
 ///
-/// It leaves room for the sums and products that sampling forms.
-pub(crate) const BRIGHTEST: f32 = 1e30;
+/// Larger: sums and products of sampling could overflow. Smaller: more images are refused.
+pub(crate) const MAX_RADIANCE: f32 = 1e30;
 
-/// Smallest positive radiance of a texel. What is darker, but not black, is raised to it.
+/// Smallest positive radiance of a texel. What is darker, but not black, is raised to it. *Format*: loaded texels are
+/// checked against it.
 ///
-/// Divided by the 2^26 texels of the largest image it is still a normal number: no mean of a region that holds
-/// a lit texel can underflow to zero.
-pub(crate) const DARKEST: f32 = 1e-30;
+/// Larger: dark images change. Smaller: means could underflow. Divided by the 2^26 texels of the largest image it is
+/// still a normal number, so no mean of a region that holds a lit texel is zero.
+pub(crate) const MIN_RADIANCE: f32 = 1e-30;
 
-/// Base-2 logarithm of the largest number of texels a side.
+/// Base-2 logarithm of the largest number of texels a side. *Format*: deeper pyramids are refused.
+///
+/// Larger: indices of texels and the rounding of the map (2.5e-7) would no longer fit the texels, 1.2e-4 of the side.
+/// Smaller: large images lose detail.
 pub(crate) const MAX_DEPTH: u32 = 13;

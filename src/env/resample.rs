@@ -1,22 +1,23 @@
-//! From a host's image to an equal-area image whose size is a power of two, by area: no flux is lost.
+//! Resampling of a host's image to an equal-area image whose size is a power of two, by area: no flux is lost.
 
 use super::lat_long::LatLong;
 use super::pyramid::level_start;
-use super::source::{Edges, Source};
-use super::{BRIGHTEST, DARKEST};
+use super::source::{Edges, EnvironmentSource};
+use super::{MAX_RADIANCE, MIN_RADIANCE};
+use crate::parallel::for_each_chunk;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Means of the source over the texels of an equal-area image of `2^depth` texels a side, `depth` at least 1, as
+/// Returns the means of the source over the texels of an equal-area image of `2^depth` texels a side, `depth` at least 1, as
 /// the finest level of an otherwise empty pyramid.
 ///
 /// A texel that shares any area with a lit cell is lit.
-pub(super) fn resample(source: &Source, edges: Edges, depth: u32) -> Vec<f32> {
+pub(super) fn resample(source: &EnvironmentSource, depth: u32) -> Vec<f32> {
     let mut levels = vec![0.0; level_start(depth + 1)];
     let image = &mut levels[level_start(depth)..];
     let size = 1_usize << depth;
-    match edges {
-        Edges::LatLong => {
+    match source.edges() {
+        Edges::LatLong(_) => {
             let source = LatLong::new(source);
             fill(image, size, |x, y| source.texel(x, y, size));
         }
@@ -26,7 +27,7 @@ pub(super) fn resample(source: &Source, edges: Edges, depth: u32) -> Vec<f32> {
 }
 
 /// Mean over the cells of an equal-area source that a texel overlaps.
-fn box_mean(source: &Source, x: usize, y: usize, size: usize) -> f64 {
+fn box_mean(source: &EnvironmentSource, x: usize, y: usize, size: usize) -> f64 {
     let cells = source.columns();
     let (mut flux, mut area) = (0.0, 0.0);
     for (row, height) in overlaps(y, size, cells) {
@@ -47,20 +48,12 @@ fn overlaps(texel: usize, size: usize, cells: usize) -> impl Iterator<Item = (us
         .map(move |cell| (cell as usize, (end.min((cell + 1) * size) - start.max(cell * size)) as f64))
 }
 
-/// Computes all texels, in parallel with the feature `rayon`. Each one is computed alone: the result does not
-/// depend on the number of threads.
-fn fill(image: &mut [f32], size: usize, texel: impl Fn(usize, usize) -> f64 + Sync) {
-    let fill_row = |(y, row): (usize, &mut [f32])| {
+/// Computes all texels, row by row. Each one is computed alone: the result does not depend on the number of threads.
+fn fill(image: &mut [f32], size: usize, texel: impl Fn(usize, usize) -> f64 + Sync + Send) {
+    for_each_chunk(image, size, |y, row| {
         for (x, out) in row.iter_mut().enumerate() {
             let mean = texel(x, y);
-            *out = if mean > 0.0 { (mean as f32).clamp(DARKEST, BRIGHTEST) } else { 0.0 };
+            *out = if mean > 0.0 { (mean as f32).clamp(MIN_RADIANCE, MAX_RADIANCE) } else { 0.0 };
         }
-    };
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        image.par_chunks_mut(size).enumerate().for_each(fill_row);
-    }
-    #[cfg(not(feature = "rayon"))]
-    image.chunks_mut(size).enumerate().for_each(fill_row);
+    });
 }

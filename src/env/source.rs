@@ -1,64 +1,64 @@
 //! The image that an environment is built from, as its host sees it.
 
-use super::{BRIGHTEST, DARKEST};
-use crate::error::{Error, Kind};
+use super::image::{EnvironmentImage, Poles};
+use super::{MAX_RADIANCE, MIN_RADIANCE};
+use crate::error::{Error, ErrorKind};
 use crate::record::Filter;
 use crate::warp::equal_area::wrap_texel;
 use alloc::vec::Vec;
 
-/// Largest side of an image.
-const MAX_SIDE: usize = 1 << 16;
+/// Largest side of an image, in texels. *Proved*: twice the side times the 2^13 texels of a resampled side is exact in
+/// the integers and doubles that resampling uses.
+///
+/// Larger: the products would still fit, but counts of texels would need 64 bits everywhere.
+const MAX_IMAGE_SIDE: usize = 1 << 16;
 
 /// How the image continues beyond its edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Edges {
-    /// Columns repeat, rows end: a latitude-longitude image.
-    LatLong,
-    /// The octahedral map's copies, rotated by half a turn.
+    /// A latitude-longitude image: columns repeat, rows continue beyond the poles as the host says.
+    LatLong(Poles),
+    /// An equal-area image: the octahedral map's copies, rotated by half a turn.
     EqualArea,
 }
 
 /// A checked image, and the grid of cells of constant radiance that stands for it.
 #[derive(Clone, Debug)]
-pub(super) struct Source {
+pub(super) struct EnvironmentSource {
     texels: Vec<f32>,
     width: usize,
     height: usize,
     edges: Edges,
     filter: Filter,
-    /// How many texels were negative.
+    /// Number of texels that were negative.
     pub(super) clamped: u32,
 }
 
-impl Source {
-    pub(super) fn new(
-        width: usize,
-        height: usize,
-        texels: &[f32],
-        edges: Edges,
-        filter: Filter,
-    ) -> Result<Self, Error> {
+impl EnvironmentSource {
+    /// Checks an image, and copies its texels.
+    pub(super) fn new(image: &EnvironmentImage<'_>) -> Result<Self, Error> {
+        let EnvironmentImage { width, height, luminance: texels, edges, filter, .. } = *image;
         let what = "environment";
-        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-            return Err(Error(Kind::ImageSize { what, width, height, limit: MAX_SIDE }));
+        if !(1..=MAX_IMAGE_SIDE).contains(&width) || !(1..=MAX_IMAGE_SIDE).contains(&height) {
+            return Err(Error(ErrorKind::ImageSize { what, width, height, limit: MAX_IMAGE_SIDE }));
         }
         // At most 2^32: counted in 64 bits, as `usize` may be narrower.
         if texels.len() as u64 != width as u64 * height as u64 {
-            return Err(Error(Kind::TexelCount { what, width, height, found: texels.len() }));
+            return Err(Error(ErrorKind::TexelCount { what, width, height, found: texels.len() }));
         }
         let mut clamped = 0_u32;
         let check = |(i, &value): (usize, &f32)| {
             let (x, y) = (i % width, i / width);
             if !value.is_finite() {
-                return Err(Error(Kind::Texel { what, x, y, value }));
+                return Err(Error(ErrorKind::Texel { what, x, y, value }));
             }
-            if value > BRIGHTEST {
-                return Err(Error(Kind::TexelTooBright { what, x, y, value, limit: BRIGHTEST }));
+            if value > MAX_RADIANCE {
+                return Err(Error(ErrorKind::TexelTooBright { what, x, y, value, limit: MAX_RADIANCE }));
             }
             if value < 0.0 {
                 clamped = clamped.saturating_add(1);
             }
-            Ok(if value > 0.0 { value.max(DARKEST) } else { 0.0 })
+            Ok(if value > 0.0 { value.max(MIN_RADIANCE) } else { 0.0 })
         };
         let texels = texels.iter().enumerate().map(check).collect::<Result<_, _>>()?;
         Ok(Self { texels, width, height, edges, filter, clamped })
@@ -70,12 +70,17 @@ impl Source {
         self.texels.iter().all(|&v| v == first).then_some(first)
     }
 
-    /// Columns of the grid of cells.
+    /// How the image continues beyond its edges.
+    pub(super) fn edges(&self) -> Edges {
+        self.edges
+    }
+
+    /// Number of columns of the grid of cells.
     pub(super) fn columns(&self) -> usize {
         self.width * self.refinement()
     }
 
-    /// Rows of the grid of cells.
+    /// Number of rows of the grid of cells.
     pub(super) fn rows(&self) -> usize {
         self.height * self.refinement()
     }
@@ -105,17 +110,22 @@ impl Source {
     /// Texel at a place inside or one step outside of the image.
     fn texel(&self, x: i32, y: i32) -> f64 {
         let (width, height) = (self.width as i32, self.height as i32);
-        let (x, y) = if (0..width).contains(&x) && (0..height).contains(&y) {
-            (x as usize, y as usize)
-        } else {
-            match self.edges {
-                Edges::LatLong => (x.rem_euclid(width) as usize, y.clamp(0, height - 1) as usize),
-                Edges::EqualArea => {
-                    let (x, y) = wrap_texel(x, y, width);
-                    (x as usize, y as usize)
-                }
+        let at = |x: i32, y: i32| f64::from(self.texels[y as usize * self.width + x as usize]);
+        if (0..width).contains(&x) && (0..height).contains(&y) {
+            return at(x, y);
+        }
+        match self.edges {
+            Edges::LatLong(Poles::Across) if !(0..height).contains(&y) => {
+                // Half a turn away. In an image of odd width that is the border of two columns.
+                let y = y.clamp(0, height - 1);
+                let [a, b] = [width / 2, (width + 1) / 2].map(|half| (x + half).rem_euclid(width));
+                0.5 * (at(a, y) + at(b, y))
             }
-        };
-        f64::from(self.texels[y * self.width + x])
+            Edges::LatLong(_) => at(x.rem_euclid(width), y.clamp(0, height - 1)),
+            Edges::EqualArea => {
+                let (x, y) = wrap_texel(x, y, width);
+                at(x as i32, y as i32)
+            }
+        }
     }
 }

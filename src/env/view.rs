@@ -1,9 +1,10 @@
 //! The borrowed form of an environment, which holds all look-ups.
 
-use super::pyramid::{Pyramid, level_start};
+use super::feature_texel::FeatureTexel;
+use super::features::BrightFeature;
+use super::pyramid::level_start;
 use super::rotation::to_local;
-use super::suns::{Sun, Suns};
-use super::texel::SunTexel;
+use crate::buffers::buffers;
 use crate::warp::equal_area::{SPHERE, sphere_to_square};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec2, Vec3};
@@ -11,65 +12,64 @@ use glam::{Mat3, Vec2, Vec3};
 /// The fixed part of an environment, plain data.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct EnvironmentHeader {
+pub(crate) struct EnvironmentHeader {
     /// Columns of the rotation from the environment's frame to the world. Orthonormal, determinant 1.
-    pub rotation: [[f32; 3]; 3],
+    pub(crate) rotation: [[f32; 3]; 3],
     /// Base-2 logarithm of the number of texels a side, `0..=13`. Zero: constant radiance.
-    pub depth: u32,
+    pub(crate) depth: u32,
     /// Mean radiance over the sphere. `0` or in `[1e-38, 1e30]`.
-    pub mean: f32,
+    pub(crate) mean: f32,
     /// Largest radiance of a texel. `0` or in `[1e-30, 1e30]`.
-    pub max: f32,
+    pub(crate) max: f32,
     /// Number of negative texels of the input, all clamped to zero.
-    pub clamped_texels: u32,
-    /// Radiance at which texels are capped in `ranges` and `filtered`: what is above it is in the suns. Infinite
-    /// without suns.
-    pub cap: f32,
+    pub(crate) clamped_texels: u32,
+    /// Radiance at which texels are capped in `ranges` and `filtered`: what is above it is in the bright
+    /// features. Infinite without features.
+    pub(crate) cap: f32,
 }
 
 const _: () = assert!(size_of::<EnvironmentHeader>() == 56);
 
-/// An environment whose data is borrowed: from an [`Environment`](crate::Environment), or from bytes that were
-/// loaded or mapped.
-///
-/// Everything that is looked up or sampled is defined here. Directions point away from the viewer; all
-/// densities are per solid angle.
-#[derive(Clone, Copy, Debug)]
-pub struct EnvironmentView<'a> {
-    pub(super) header: EnvironmentHeader,
-    /// Means of all levels, the coarsest (one texel) first, rows from the square's `y = 0`.
-    pub(super) means: &'a [f32],
-    /// Minimum and maximum of all levels of the capped image but the finest, laid out like `means`.
-    pub(super) ranges: &'a [[f32; 2]],
-    /// 3x3 box-filtered means of all levels of the capped image, laid out like `means`.
-    pub(super) filtered: &'a [f32],
-    /// Clusters of texels above the cap.
-    pub(super) suns: &'a [Sun],
-    /// Their texels.
-    pub(super) sun_texels: &'a [SunTexel],
+buffers! {
+    /// A non-negative radiance over all directions, seen from the scene.
+    ///
+    /// What is stored is one number a direction, the luminance of the environment. All lookups are those of
+    /// [`EnvironmentView`].
+    ///
+    /// # Frames
+    ///
+    /// The environment's own frame has `z` up; `with_rotation` places it in the world. A latitude-longitude image is
+    /// seen from inside: its point `(u, v)`, with `v = 0` at the top, is the direction
+    /// `(cos φ sin θ, -sin φ sin θ, cos θ)`, where `θ = π v` and `φ = 2π u`. An equal-area image has pbrt-v4's
+    /// orientation: its center is `+z`, its corners are `-z`, and its axes run along `x` and `y`.
+    pub Environment,
+    /// An environment whose data is borrowed: from an [`Environment`], or from bytes that were loaded or mapped.
+    ///
+    /// Everything that is looked up or sampled is defined here. Directions point away from the viewer; all
+    /// densities are per solid angle.
+    EnvironmentView
+    plain {
+        /// The fixed part.
+        header: EnvironmentHeader,
+    }
+    buffers {
+        /// Means of all levels, the coarsest (one texel) first, rows from the square's `y = 0`.
+        means: f32 = b"EMEA" version 1,
+        /// Minimum and maximum of all levels of the capped image but the finest, laid out like `means`.
+        ranges: [f32; 2] = b"ERAN" version 1,
+        /// 3x3 box-filtered means of all levels of the capped image, laid out like `means`.
+        filtered: f32 = b"EFIL" version 1,
+        /// Clusters of texels above the cap.
+        features: BrightFeature = b"EFEA" version 1,
+        /// Texels of all features.
+        feature_texels: FeatureTexel = b"ETEX" version 1,
+    }
 }
 
-impl<'a> EnvironmentView<'a> {
-    pub(super) fn from_pyramid(header: EnvironmentHeader, pyramid: &'a Pyramid, suns: &'a Suns) -> Self {
-        Self {
-            header,
-            means: &pyramid.means,
-            ranges: &pyramid.ranges,
-            filtered: &pyramid.filtered,
-            suns: &suns.suns,
-            sun_texels: &suns.texels,
-        }
-    }
-
-    /// Clusters of texels that are much brighter than the rest.
+impl EnvironmentView<'_> {
+    /// Mean radiance over the sphere without the bright features.
     #[inline]
-    pub fn suns(&self) -> &'a [Sun] {
-        self.suns
-    }
-
-    /// Mean radiance over the sphere without the suns.
-    #[inline]
-    pub(crate) fn mean_without_suns(&self) -> f32 {
+    pub(crate) fn mean_without_features(&self) -> f32 {
         self.filtered[0]
     }
 
@@ -129,7 +129,7 @@ impl<'a> EnvironmentView<'a> {
         texel_at(self.header.depth, sphere_to_square(to_local(&self.header.rotation, direction)))
     }
 
-    /// 3x3 filtered mean of a texel of the level with `2^depth` texels a side, without the suns.
+    /// 3x3 filtered mean of a texel of the level with `2^depth` texels a side, without the bright features.
     #[inline]
     pub(super) fn filtered_at(&self, depth: u32, x: u32, y: u32) -> f32 {
         self.filtered[level_start(depth) + ((y << depth) | x) as usize]

@@ -1,10 +1,304 @@
-//! Joins a triangle, its texture's tree and the environment into one target.
+//! The lights: one file a kind, one enum, and the buffers that hold the lights of a scene.
+//!
+//! Everything that depends on the kind of a light is a method of [`LightKind`] (the light itself) or of [`LightViewKind`]
+//! (the light as seen from a shading point). Above this level a light is the number of a leaf. A new kind is a new file, and
+//! a variant in both enums.
 
+mod cell_weight;
+mod collect;
+mod emitted;
+mod energy;
 mod illumination;
-mod sun;
+mod mesh;
+mod meshes;
 mod triangle;
-mod worth;
+mod triangle_view;
+mod update;
+mod validate;
 
+use glam::{DVec3, Vec3};
+
+use crate::blas::{CellBlock, Lattice};
+use crate::bounds::{LightBounds, Moments};
+use crate::buffers::buffers;
+use crate::env::EnvironmentView;
+use crate::receiver::ShadingPoint;
+use crate::record::{MeshId, TriangleId};
+use crate::warp::Variate;
+
+pub(crate) use collect::LightCollection;
+pub(crate) use emitted::EmissionStart;
+pub(crate) use energy::{Energies, storable};
 pub use illumination::Illumination;
-pub(crate) use sun::{Part, Sunlit};
-pub(crate) use triangle::{LightTriangle, Lit, POSITION_LIMIT};
+pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
+use meshes::{mesh_of, scale_of};
+pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
+pub(crate) use triangle_view::TriangleView;
+
+/// Marks a triangle that is not in the tree because it emits nothing, whatever its shape. *Format.*
+pub(crate) const NO_LEAF: u32 = u32::MAX;
+/// Marks a triangle that is not in the tree because it has no area. *Format.*
+pub(crate) const NO_AREA: u32 = u32::MAX - 1;
+
+buffers! {
+    /// The lights of a scene.
+    pub(crate) Lights,
+    /// The lights of a scene in borrowed memory.
+    LightsView
+    plain {
+        /// Term that guides the descent inside a triangle.
+        illumination: Illumination,
+        /// Energy of all lights together, without the environment's bright features: weight times area, times mean
+        /// radiance for portals. Zero only if nothing is emitted.
+        energy: f32,
+        /// Whether any light is a portal.
+        has_portals: bool,
+    }
+    buffers {
+        /// Triangles, in the order of the tree's leaves.
+        triangles: LightTriangle = b"TRIA" version 1,
+        /// Nodes of the trees over textures.
+        cells: CellBlock = b"CELL" version 1,
+        /// Where the triangles of each mesh start in `leaf_of`, and their number at the end.
+        meshes: u32 = b"MESH" version 1,
+        /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`].
+        leaf_of: u32 = b"LEAF" version 1,
+        /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
+        scales: f32 = b"SCAL" version 1,
+    }
+}
+
+/// A light of any kind.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Light<'a> {
+    /// A triangle of an emissive mesh or of a portal.
+    Triangle(&'a LightTriangle),
+}
+
+/// A light of any kind as seen from a shading point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum LightView<'a> {
+    /// A triangle of an emissive mesh or of a portal.
+    Triangle(TriangleView<'a>),
+}
+
+/// A point on a light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LightPoint {
+    pub(crate) leaf: u32,
+    pub(crate) point: Lattice,
+}
+
+/// What a light of any kind says of itself.
+pub(crate) trait LightKind {
+    /// Returns the light's number among all that were added.
+    fn index(&self) -> u32;
+
+    /// Whether the environment shines in through the light.
+    fn is_portal(&self) -> bool;
+
+    /// Whether the light emits from its back as well.
+    fn is_two_sided(&self) -> bool;
+
+    /// Returns the average weight: radiance of an emitter, transmittance of a portal.
+    fn weight(&self) -> f32;
+
+    /// Returns the area that light leaves from, once for lights of two sides.
+    fn area(&self) -> f32;
+
+    /// Returns bounds and moments. `energy` gives the energy by the area; `directional` says whether it depends on the
+    /// direction.
+    fn bounds(&self, directional: bool, energy: impl FnOnce(f32) -> f32) -> (LightBounds, Moments);
+
+    /// Whether anything can travel from the light to the shading point.
+    fn is_visible(&self, x: &ShadingPoint) -> bool;
+
+    /// Returns the point where a ray crosses the light, if it does. `direction` need not be a unit vector.
+    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<Lattice>;
+
+    /// Fetches the light's memory, so that a later look at it does not wait.
+    fn prefetch(&self);
+}
+
+/// What a light of any kind says of itself to a shading point.
+pub(crate) trait LightViewKind {
+    /// Draws a point of the light with its density per solid angle; `None` where nothing can arrive from the part of the
+    /// light that the variates lead to.
+    fn sample(&self, u: [Variate; 2]) -> Option<(Lattice, f64)>;
+
+    /// Returns the density per solid angle with which [`Self::sample`] draws a point, if that is positive.
+    fn pdf(&self, point: Lattice) -> Option<f64>;
+
+    /// Returns a point of the light relative to the shading point.
+    fn point(&self, point: Lattice) -> DVec3;
+
+    /// Returns the unit normal of the front side.
+    fn normal(&self) -> Vec3;
+
+    /// Returns the solid angle at the shading point per area of the light at this place: `cos θl / d²`.
+    fn solid_angle_per_area(&self, point: DVec3) -> f64;
+
+    /// Returns an estimate of the irradiance from the light, whose weight is multiplied by `scale`. Zero only if nothing can
+    /// arrive.
+    fn irradiance(&self, scale: f32) -> f32;
+}
+
+/// Calls the same method of whichever kind a light is.
+macro_rules! dispatch {
+    ($enum:ident, $light:expr, $kind:ident => $call:expr) => {
+        match $light {
+            $enum::Triangle($kind) => $call,
+        }
+    };
+}
+
+impl LightKind for Light<'_> {
+    #[inline]
+    fn index(&self) -> u32 {
+        dispatch!(Light, self, kind => kind.index())
+    }
+
+    #[inline]
+    fn is_portal(&self) -> bool {
+        dispatch!(Light, self, kind => kind.is_portal())
+    }
+
+    #[inline]
+    fn is_two_sided(&self) -> bool {
+        dispatch!(Light, self, kind => kind.is_two_sided())
+    }
+
+    #[inline]
+    fn weight(&self) -> f32 {
+        dispatch!(Light, self, kind => kind.weight())
+    }
+
+    fn area(&self) -> f32 {
+        dispatch!(Light, self, kind => kind.area())
+    }
+
+    #[inline]
+    fn bounds(&self, directional: bool, energy: impl FnOnce(f32) -> f32) -> (LightBounds, Moments) {
+        dispatch!(Light, self, kind => kind.bounds(directional, energy))
+    }
+
+    #[inline]
+    fn is_visible(&self, x: &ShadingPoint) -> bool {
+        dispatch!(Light, self, kind => kind.is_visible(x))
+    }
+
+    #[inline]
+    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<Lattice> {
+        dispatch!(Light, self, kind => kind.intersect(origin, direction))
+    }
+
+    #[inline(always)]
+    fn prefetch(&self) {
+        dispatch!(Light, self, kind => kind.prefetch());
+    }
+}
+
+impl LightViewKind for LightView<'_> {
+    #[inline(always)]
+    fn sample(&self, u: [Variate; 2]) -> Option<(Lattice, f64)> {
+        dispatch!(LightView, self, kind => kind.sample(u))
+    }
+
+    #[inline]
+    fn pdf(&self, point: Lattice) -> Option<f64> {
+        dispatch!(LightView, self, kind => kind.pdf(point))
+    }
+
+    #[inline]
+    fn point(&self, point: Lattice) -> DVec3 {
+        dispatch!(LightView, self, kind => kind.point(point))
+    }
+
+    #[inline]
+    fn normal(&self) -> Vec3 {
+        dispatch!(LightView, self, kind => kind.normal())
+    }
+
+    #[inline]
+    fn solid_angle_per_area(&self, point: DVec3) -> f64 {
+        dispatch!(LightView, self, kind => kind.solid_angle_per_area(point))
+    }
+
+    fn irradiance(&self, scale: f32) -> f32 {
+        dispatch!(LightView, self, kind => kind.irradiance(scale))
+    }
+}
+
+impl LightView<'_> {
+    /// Returns the view as that of a portal; `None` for kinds of lights that are none.
+    #[inline]
+    pub(crate) fn as_portal(&self) -> Option<&TriangleView<'_>> {
+        match self {
+            Self::Triangle(view) => Some(view),
+        }
+    }
+}
+
+impl LightPoint {
+    /// Returns the point of a light with barycentrics that may have been rounded.
+    #[inline]
+    pub(crate) fn new(leaf: u32, barycentrics: [f32; 2]) -> Self {
+        Self { leaf, point: Lattice::from_barycentrics(barycentrics) }
+    }
+}
+
+impl<'a> LightsView<'a> {
+    /// Number of lights.
+    pub(crate) fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Whether there is no light.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
+    /// Returns the light in a leaf.
+    #[inline(always)]
+    pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
+        Light::Triangle(&self.triangles[leaf as usize])
+    }
+
+    /// Returns a light as seen from a shading point; `None` if nothing can arrive from it. `environment` is what portals
+    /// show, if that depends on the direction.
+    #[inline(always)]
+    pub(crate) fn view<'v>(
+        &self,
+        leaf: u32,
+        x: &ShadingPoint,
+        environment: Option<&'v EnvironmentView<'v>>,
+    ) -> Option<LightView<'v>>
+    where
+        'a: 'v,
+    {
+        let light = &self.triangles[leaf as usize];
+        TriangleView::new(light, x, self.illumination, self.cells, environment).map(LightView::Triangle)
+    }
+
+    /// Returns the leaf of a triangle; `None` for one that emits nothing or that was never added.
+    pub(crate) fn leaf(&self, id: TriangleId) -> Option<u32> {
+        let mesh = id.mesh.0 as usize;
+        let start = *self.meshes.get(mesh)?;
+        let end = *self.meshes.get(mesh + 1)?;
+        let index = start.checked_add(id.triangle).filter(|index| *index < end)?;
+        self.leaf_of.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
+    }
+
+    /// Returns the triangle in a leaf.
+    pub(crate) fn id(&self, leaf: u32) -> TriangleId {
+        let index = self.light(leaf).index();
+        let mesh = mesh_of(self.meshes, index);
+        TriangleId::new(MeshId(mesh as u32), index.wrapping_sub(self.meshes[mesh]))
+    }
+
+    /// Returns what the weight of a light is multiplied by.
+    #[inline]
+    pub(crate) fn scale(&self, leaf: u32) -> f32 {
+        scale_of(self.scales, self.meshes, self.light(leaf).index())
+    }
+}

@@ -1,10 +1,9 @@
 //! The plain records that a host hands in and gets back.
 
+mod ids;
 mod image;
 mod sample;
 
+pub use ids::{MeshId, TextureId, TriangleId};
 pub use image::{Filter, Wrap};
-pub use sample::{Hit, LightSample, TriangleId};
-
-// Until all importers have moved.
-pub(crate) use crate::receiver::{Receiver, ShadingPoint};
+pub use sample::{Hit, LightSample};

@@ -2,14 +2,7 @@
 
 use glam::Vec3;
 
-/// One triangle of one mesh that was handed to the builder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TriangleId {
-    /// Number of the mesh, in the order in which meshes were added.
-    pub mesh: u32,
-    /// Number of the triangle in its mesh.
-    pub triangle: u32,
-}
+use super::ids::TriangleId;
 
 /// A point on a light triangle, as a host's own intersector reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,259 +1,183 @@
 //! From a host's meshes, textures and environment to a sampler.
 
-use alloc::collections::BTreeMap;
-use alloc::vec;
-use alloc::vec::Vec;
+use core::fmt;
 use core::ops::ControlFlow;
 
-use super::energy::{Energies, Scales};
-use super::lights::{LightSampler, NO_AREA, NO_LEAF};
-use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
-use crate::blas::{self, Procedural, RegisteredFunction, Root, Texture, TexturePyramid};
+use super::lights::LightSampler;
+use crate::blas::{Procedural, Texture};
 use crate::env::Environment;
-use crate::error::{Error, Kind as ErrorKind};
-use crate::light::{Illumination, LightTriangle};
+use crate::error::{Error, ErrorKind};
+use crate::light::{Energies, Illumination, LightCollection, Mesh};
 use crate::parallel;
-use crate::tlas::{self, MAX_LEAVES, Report};
-
-/// What a textured weight is read from.
-#[derive(Debug)]
-enum Surface<'a> {
-    Image(TexturePyramid<'a>),
-    Function(RegisteredFunction<'a>),
-}
+use crate::record::{MeshId, TextureId};
+use crate::tlas::{self, Arity, Report};
 
 /// Collects the lights of a scene and builds a [`LightSampler`].
 ///
-/// Everything is checked when it is added; what was accepted can always be sampled. `N` is the arity of the tree
-/// over triangles (4, 8 or 16).
-/// The wider a tree, the better its choices; on machines without AVX, 8 may be faster than the default of 16.
-#[derive(Debug)]
-pub struct LightSamplerBuilder<'a, const N: usize = 16> {
+/// Everything is checked when it is added; what was accepted can always be sampled. The methods come in two forms: those
+/// that take and return the builder are for one expression, those that begin with `add_` are for loops.
+///
+/// ```
+/// use fanlight::glam::Vec3;
+/// use fanlight::{Arity, Environment, LightSampler, Mesh};
+///
+/// let positions = [[0.0, 0.0, 2.0], [0.0, 1.0, 2.0], [1.0, 0.0, 2.0]].map(Vec3::from);
+/// let lights = LightSampler::builder()
+///     .environment(Environment::constant(0.5)?)
+///     .arity(Arity::Eight)
+///     .mesh(&Mesh::portal(&positions, &[[0, 1, 2]]))?
+///     .build()?;
+///
+/// let mut builder = LightSampler::builder();
+/// for height in [2.0, 3.0] {
+///     let lifted = positions.map(|p| p.with_z(height));
+///     builder.add_mesh(&Mesh::emitter(&lifted, &[[0, 1, 2]]))?;
+/// }
+/// assert_eq!((lights.light_count(), builder.build()?.light_count()), (1, 2));
+/// # Ok::<(), fanlight::Error>(())
+/// ```
+#[must_use]
+pub struct LightSamplerBuilder<'a> {
+    arity: Arity,
     environment: Option<Environment>,
     illumination: Illumination,
-    textures: Vec<Surface<'a>>,
-    /// Triangles that may send light.
-    triangles: Vec<LightTriangle>,
-    /// For every triangle that was added, its place in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
-    places: Vec<u32>,
-    /// Where each mesh starts in `places`, and the end.
-    meshes: Vec<u32>,
-    cells: Vec<blas::CellBlock>,
-    /// Trees over textures by texture and the bits of the three uvs.
-    shared: BTreeMap<(usize, [u32; 6]), Root>,
+    collection: LightCollection<'a>,
 }
 
-impl<const N: usize> Default for LightSamplerBuilder<'_, N> {
+impl fmt::Debug for LightSamplerBuilder<'_> {
+    /// Shows how much has been added.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [textures, meshes, triangles] = self.collection.counts();
+        f.debug_struct("LightSamplerBuilder")
+            .field("arity", &self.arity)
+            .field("environment", &self.environment)
+            .field("illumination", &self.illumination)
+            .field("textures", &textures)
+            .field("meshes", &meshes)
+            .field("triangles", &triangles)
+            .finish()
+    }
+}
+
+impl Default for LightSamplerBuilder<'_> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<'a, const N: usize> LightSamplerBuilder<'a, N> {
-    /// A builder without lights, whose environment is white.
+impl<'a> LightSamplerBuilder<'a> {
+    /// Returns a builder without lights, whose environment is white.
     pub fn new() -> Self {
-        const { assert!(N == 4 || N == 8 || N == 16, "the arity of the tree over triangles is 4, 8 or 16") };
         Self {
+            arity: Arity::default(),
             environment: None,
             illumination: Illumination::default(),
-            textures: Vec::new(),
-            triangles: Vec::new(),
-            places: Vec::new(),
-            meshes: vec![0],
-            cells: Vec::new(),
-            shared: BTreeMap::new(),
+            collection: LightCollection::new(),
         }
     }
 
     /// Sets what the portals show.
-    pub fn environment(&mut self, environment: Environment) -> &mut Self {
+    pub fn environment(mut self, environment: Environment) -> Self {
         self.environment = Some(environment);
         self
     }
 
+    /// Sets the arity of the tree over the lights, 16 by default.
+    ///
+    /// The wider the tree, the better its choices. On machines without AVX, 8 may be faster.
+    pub fn arity(mut self, arity: Arity) -> Self {
+        self.arity = arity;
+        self
+    }
+
     /// Sets the term that guides the descent inside a triangle.
-    pub fn illumination(&mut self, illumination: Illumination) -> &mut Self {
+    pub fn illumination(mut self, illumination: Illumination) -> Self {
         self.illumination = illumination;
         self
     }
 
-    /// Adds a texture that meshes can refer to. Its texels are needed until [`Self::build`].
+    /// Adds a texture, in one expression. Textures and functions are numbered together, from 0.
+    pub fn texture(mut self, texture: Texture<'a>) -> Self {
+        self.add_texture(texture);
+        self
+    }
+
+    /// Adds a function that takes the place of a texture, in one expression.
+    pub fn procedural(mut self, function: &'a dyn Procedural) -> Self {
+        self.add_procedural(function);
+        self
+    }
+
+    /// Adds a mesh, in one expression. Meshes are numbered from 0.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::add_mesh`].
+    pub fn mesh(mut self, mesh: &Mesh<'_>) -> Result<Self, Error> {
+        self.add_mesh(mesh)?;
+        Ok(self)
+    }
+
+    /// Adds a texture that meshes can refer to. Its texels are read until the builder is built.
     pub fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
-        self.textures.push(Surface::Image(TexturePyramid::new(texture)));
-        TextureId(self.textures.len() - 1)
+        self.collection.add_texture(texture)
     }
 
-    /// Adds a function of texture coordinates that meshes can refer to like a texture. It is asked by
-    /// [`Self::add_mesh`].
+    /// Adds a function of texture coordinates that meshes can refer to like a texture. [`Self::add_mesh`] evaluates it.
     pub fn add_procedural(&mut self, function: &'a dyn Procedural) -> TextureId {
-        self.textures.push(Surface::Function(RegisteredFunction::new(function)));
-        TextureId(self.textures.len() - 1)
+        self.collection.add_procedural(function)
     }
 
-    /// Adds a mesh. Returns its number: meshes are numbered in the order in which they are added. After an error the
-    /// builder is as it was before.
+    /// Adds a mesh. After an error the builder is as it was before.
     ///
     /// # Errors
     ///
     /// If a vertex is not finite or has a coordinate above 1e9, an index has no vertex, the weight is NaN, negative
     /// or above 1e30, or it is a texture of another builder or one without as many uvs as vertices; if the bounds of a
     /// [`Procedural`] are not finite, negative or in the wrong order, or its weight is not within them.
-    pub fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<u32, Error> {
-        let number = self.meshes.len() - 1;
-        self.check(number, mesh)?;
-        let before = (self.triangles.len(), self.places.len(), self.cells.len());
-        let function = self.function(mesh).copied();
-        for indices in mesh.indices {
-            if let Err(error) = self.add_triangle(mesh, *indices) {
-                if let (Some(changed), Some(before)) = (self.function(mesh), function) {
-                    *changed = before;
-                }
-                self.triangles.truncate(before.0);
-                self.places.truncate(before.1);
-                self.cells.truncate(before.2);
-                self.shared.retain(|_, root| blas::holds(&self.cells, *root));
-                return Err(error);
-            }
-        }
-        self.meshes.push(self.places.len() as u32);
-        Ok(number as u32)
+    pub fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<MeshId, Error> {
+        self.collection.add_mesh(mesh)
     }
 
-    /// Builds the tree over all triangles that can send light.
+    /// Builds the tree over all triangles that can emit light.
     ///
     /// # Errors
     ///
     /// If there are more triangles than the tree can number (2^28 - 1).
-    pub fn build(self) -> Result<LightSampler<N>, Error> {
+    pub fn build(self) -> Result<LightSampler, Error> {
         self.build_reporting(None)
     }
 
-    /// [`Self::build`] for hosts that show how far it is, or that want to be able to stop it. `report` is called now
-    /// and then with the share of the work that is done, in `[0, 1]`, and last with 1; [`ControlFlow::Break`] cancels
-    /// the build. With the feature `rayon` the calls come from the threads that build, several at once and not always
-    /// in order.
+    /// Builds as [`Self::build`] does, for hosts that show progress or that need to be able to cancel.
+    ///
+    /// `report` is called with the share of the work that is done, in `[0, 1]`, and last with 1;
+    /// [`ControlFlow::Break`] cancels the build. With the feature `rayon` the calls come from the threads that build,
+    /// several at once and not always in order.
     ///
     /// # Errors
     ///
     /// As [`Self::build`], and one of which [`Error::is_cancelled`] is true if `report` has cancelled the build.
-    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler<N>, Error> {
+    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler, Error> {
         self.build_reporting(Some(&report))
     }
 
-    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N>, Error> {
+    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
-        let energies = Energies::new(&environment, Scales::default());
-        let sends = parallel::collect(self.triangles.len(), |i| energies.energy(&self.triangles[i]) > 0.0);
-        let sending: Vec<u32> = (0..).zip(sends).filter_map(|(i, sends)| sends.then_some(i)).collect();
-        if sending.len() > MAX_LEAVES {
-            return Err(Error(ErrorKind::TooMany { what: "light triangles", count: sending.len(), limit: MAX_LEAVES }));
-        }
-        let total = energies.total(&self.triangles);
-        let bounds = |light: u32| energies.bounds(&self.triangles[sending[light as usize] as usize], total).0;
+        let energies = Energies::new(&environment, &[], &[]);
+        let collection = self.collection;
+        let emitting = collection.emitting(&energies)?;
+        let total = collection.total_energy(&energies);
+        let bounds = |i: u32| energies.bounds(collection.light(emitting[i as usize]), total).0;
         let cancelled = |_| Error(ErrorKind::Cancelled);
-        let (tlas, order) = tlas::build::<N>(sending.len(), &bounds, report).map_err(cancelled)?;
-        let places = parallel::collect(order.len(), |leaf| sending[order[leaf] as usize]);
-        let triangles = parallel::collect(places.len(), |leaf| self.triangles[places[leaf] as usize]);
-        let portals = self.triangles.iter().any(LightTriangle::is_portal);
-        let mut leaf_of = vec![NO_LEAF; self.triangles.len()];
-        for (leaf, &place) in (0..).zip(&places) {
-            leaf_of[place as usize] = leaf;
-        }
-        let leaf_at = |&place: &u32| leaf_of.get(place as usize).copied().unwrap_or(place);
-        let mut lights = LightSampler {
-            tlas,
-            triangles,
-            leaves: self.places.iter().map(leaf_at).collect(),
-            meshes: self.meshes,
-            scales: Vec::new(),
-            cells: self.cells,
-            energy: 0.0,
-            portals,
-            environment,
-            illumination: self.illumination,
-            cost: 1.0,
-            cost_at_build: 1.0,
-        };
-        lights.fit();
-        lights.cost_at_build = lights.cost;
+        let (tlas, order) = tlas::build(self.arity, emitting.len(), &bounds, report).map_err(cancelled)?;
+        let leaves = parallel::collect(order.len(), |leaf| emitting[order[leaf] as usize]);
+        let lights = collection.into_lights(self.illumination, &leaves);
+        let mut sampler = LightSampler { tlas, lights, environment, cost: 1.0, cost_at_build: 1.0 };
+        sampler.fit();
+        sampler.cost_at_build = sampler.cost;
         match report.map(|report| report(1.0)) {
             Some(ControlFlow::Break(())) => Err(Error(ErrorKind::Cancelled)),
-            Some(ControlFlow::Continue(())) | None => Ok(lights),
+            Some(ControlFlow::Continue(())) | None => Ok(sampler),
         }
-    }
-
-    fn check(&self, number: usize, mesh: &Mesh<'_>) -> Result<(), Error> {
-        let fail = |kind| Err(Error(kind));
-        let vertices = mesh.positions.len();
-        let count = self.places.len().saturating_add(mesh.indices.len());
-        if count > MAX_LEAVES {
-            return fail(ErrorKind::TooMany { what: "triangles", count, limit: MAX_LEAVES });
-        }
-        check_triangles(number, mesh.positions, mesh.indices)?;
-        match mesh.weight {
-            Weight::Constant(value) if !(0.0..=blas::MAX_AVERAGE).contains(&value) => {
-                fail(ErrorKind::Weight { mesh: number, value, limit: blas::MAX_AVERAGE })
-            }
-            Weight::Constant(_) => Ok(()),
-            Weight::Texture(TextureId(texture)) if texture >= self.textures.len() => {
-                fail(ErrorKind::UnknownTexture { mesh: number, texture, textures: self.textures.len() })
-            }
-            Weight::Texture(_) if mesh.uvs.len() != vertices => {
-                fail(ErrorKind::TextureCoordinateCount { mesh: number, found: mesh.uvs.len(), vertices })
-            }
-            Weight::Texture(_) => {
-                mesh.uvs.iter().enumerate().try_for_each(|(vertex, uv)| blas::check_uv(number, vertex, *uv))
-            }
-        }
-    }
-
-    fn add_triangle(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<(), Error> {
-        let root = self.root(mesh, indices)?;
-        let two_sided = if mesh.sides == Sides::Two { LightTriangle::TWO_SIDED } else { 0 };
-        let portal = if mesh.kind == Kind::Portal { LightTriangle::PORTAL } else { 0 };
-        let triangle = LightTriangle {
-            vertices: indices.map(|index| mesh.positions[index as usize].to_array()),
-            root,
-            place_and_flags: self.places.len() as u32 | two_sided | portal,
-        };
-        if root.average == 0.0 {
-            self.places.push(NO_LEAF);
-        } else if triangle.triangle().normal_and_area().is_none() {
-            self.places.push(NO_AREA);
-        } else {
-            self.places.push(self.triangles.len() as u32);
-            self.triangles.push(triangle);
-        }
-        Ok(())
-    }
-
-    /// What guides the mesh, if that is a function.
-    fn function(&mut self, mesh: &Mesh<'_>) -> Option<&mut RegisteredFunction<'a>> {
-        let Weight::Texture(TextureId(texture)) = mesh.weight else { return None };
-        match &mut self.textures[texture] {
-            Surface::Function(function) => Some(function),
-            Surface::Image(_) => None,
-        }
-    }
-
-    /// The tree over the texture of one triangle, built only if no triangle before has the same.
-    fn root(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<Root, Error> {
-        let texture = match mesh.weight {
-            Weight::Constant(weight) => return Ok(Root::constant(blas::storable(f64::from(weight)))),
-            Weight::Texture(TextureId(texture)) => texture,
-        };
-        let uvs = indices.map(|index| mesh.uvs[index as usize]);
-        let [a, b, c] = uvs.map(|uv| uv.to_array().map(f32::to_bits));
-        let key = (texture, [a[0], a[1], b[0], b[1], c[0], c[1]]);
-        if let Some(&root) = self.shared.get(&key) {
-            return Ok(root);
-        }
-        let mesh = self.meshes.len() - 1;
-        let root = match &mut self.textures[texture] {
-            Surface::Image(image) => blas::build(image, uvs, &mut self.cells),
-            Surface::Function(function) => blas::build_procedural(function, mesh, uvs, &mut self.cells),
-        }?;
-        self.shared.insert(key, root);
-        Ok(root)
     }
 }

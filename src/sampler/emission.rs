@@ -5,23 +5,24 @@
 
 use core::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
-use super::lights::{LightSampler, LightSamplerView};
-use super::sample::{to_finite, to_positive};
-use crate::blas::{self, CellTarget, CellWeight, Draw, Follow, Guide, Lattice, LatticeCell};
-use crate::env::Directions;
-use crate::geometry;
-use crate::light::LightTriangle;
+use super::finite::{to_finite, to_positive};
+use super::lights::LightSamplerView;
+use crate::blas::Lattice;
+use crate::env::DirectionDistribution;
+use crate::light::{EmissionStart, Light, LightKind};
 use crate::math;
 use crate::record::Hit;
+use crate::technique::LightScene;
 use crate::tlas::{Beam, Outgoing};
 use crate::warp::{Variate, pick_pair, seed};
 
 /// A ray of light that leaves an emitter or enters through a portal.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct EmissionSample {
-    /// Where on the lights the ray starts.
+    /// Point on the lights that the ray starts from.
     pub hit: Hit,
     /// World position of that point.
     pub position: Vec3,
@@ -45,81 +46,45 @@ pub struct EmissionSample {
 /// its power, with cosine-distributed directions. For portals to an image, a direction is drawn by radiance times the
 /// area that all portals turn towards it, then a point by transmittance and that area.
 ///
-/// Made by [`LightSampler::emission`] in some microseconds; holds about 1.5 KB.
+/// Made by [`LightSampler::emission`](crate::LightSampler::emission) in some microseconds; holds about 1.5 KB. Make it again
+/// after the environment has been rotated.
 #[derive(Clone, Debug)]
-pub struct Emission<'a, const N: usize = 16> {
-    lights: LightSamplerView<'a, N>,
-    directions: Directions,
+pub struct Emission<'a> {
+    scene: LightScene<'a>,
+    directions: DirectionDistribution,
     /// Probabilities of a ray that does not depend on the direction, and of one from the environment's image.
     shares: [f64; 2],
 }
 
-/// A cell of the texture is as good as any other of the same average.
-struct Everywhere;
-
-impl CellTarget for Everywhere {
-    type Cell = ();
-
-    fn whole(&self) {}
-
-    fn child(&self, (): &(), _index: usize) {}
-
-    #[inline]
-    fn weigh(&self, _at: LatticeCell, (): &mut ()) -> CellWeight {
-        CellWeight { weight: 1.0, is_final: true }
+impl<'a> LightSamplerView<'a> {
+    /// Prepares to draw rays of light.
+    #[must_use]
+    pub fn emission(&self) -> Emission<'a> {
+        Emission::new(self.scene)
     }
 }
 
-impl<const N: usize> LightSampler<N> {
-    /// See [`LightSamplerView::emission`].
-    pub fn emission(&self) -> Emission<'_, N> {
-        self.as_view().emission()
-    }
-}
-
-impl<'a, const N: usize> LightSamplerView<'a, N> {
-    /// Prepares to draw rays of light. To be made anew once the environment was turned.
-    pub fn emission(&self) -> Emission<'a, N> {
-        let directions = Directions::new(&self.environment, |direction, radius| {
+impl<'a> Emission<'a> {
+    fn new(scene: LightScene<'a>) -> Self {
+        let directions = DirectionDistribution::new(&scene.environment, |direction, radius| {
             let (sin, cos) = math::sin_cos(radius);
-            self.outgoing(&self.beam(-direction, [sin, cos]))
+            outgoing_of_all(&scene, &beam(&scene, -direction, [sin, cos]))
         });
-        let diffuse = PI * self.outgoing(&Outgoing::Diffuse);
-        let mean = self.environment.mean_without_suns();
-        let is_image = !self.environment.is_constant() && mean > 0.0;
+        let diffuse = PI * outgoing_of_all(&scene, &Outgoing::Diffuse);
+        let mean = scene.environment.mean_without_features();
+        let is_image = !scene.environment.is_constant() && mean > 0.0;
         let through = if is_image { directions.total() / mean } else { 0.0 };
         let total = f64::from(diffuse) + f64::from(through);
         let share = |power: f32| if power > 0.0 { f64::from(power) / total } else { 0.0 };
-        Emission { lights: *self, directions, shares: [share(diffuse), share(through)] }
+        Self { scene, directions, shares: [share(diffuse), share(through)] }
     }
 
-    fn beam(&self, direction: Vec3, spread: [f32; 2]) -> Outgoing {
-        Outgoing::Beam(Beam { direction, spread, portals_apart: !self.environment.is_constant() })
-    }
-
-    /// What all lights send out, in units of the sum of their energies.
-    fn outgoing(&self, outgoing: &Outgoing) -> f32 {
-        self.tlas.outgoing(outgoing).unwrap_or_else(|| match (self.triangles, outgoing) {
-            ([light], Outgoing::Diffuse) => f32::from(u8::from(!self.is_directional(light))),
-            ([light], Outgoing::Beam(beam)) if self.is_directional(light) || !beam.portals_apart => {
-                let normal = light.triangle().normal_and_area().map_or(Vec3::ZERO, |(normal, _)| normal);
-                beam.projection(normal, [0.0, 1.0], normal, light.is_two_sided())
-            }
-            _ => 0.0,
-        })
-    }
-
-    /// Whether what a light sends depends on the direction it is seen from.
-    fn is_directional(&self, light: &LightTriangle) -> bool {
-        light.is_portal() && !self.environment.is_constant()
-    }
-}
-
-impl<const N: usize> Emission<'_, N> {
-    /// Draws a ray of light. `u` is uniform in `[0, 1)⁵`: the first chooses the triangle, the next two the point on it,
+    /// Draws a ray of light. `u` is uniform in `[0, 1)⁵`: the first number chooses the light, the next two the point on it,
     /// the last two the direction.
     ///
-    /// `None` where the drawn direction meets no side of a light that sends; such a `u` counts as a ray without power.
+    /// Returns `None` where the drawn direction meets no side of a light that emits; such a `u` counts as a ray without
+    /// power.
+    #[must_use]
     pub fn sample(&self, u: [f32; 5]) -> Option<EmissionSample> {
         if self.shares == [0.0; 2] {
             return None;
@@ -128,7 +93,7 @@ impl<const N: usize> Emission<'_, N> {
         match pick_pair(self.shares.map(|share| share as f32), &mut choice) {
             0 => self.sample_diffuse(choice, [b1, b2], [d1, d2]),
             _ => {
-                let (towards, pdf) = self.directions.sample(&self.lights.environment, [d1, d2])?;
+                let (towards, pdf) = self.directions.sample(&self.scene.environment, [d1, d2])?;
                 self.sample_beam(-towards, self.shares[1] * pdf, choice, [b1, b2])
             }
         }
@@ -137,69 +102,86 @@ impl<const N: usize> Emission<'_, N> {
     /// Draws a ray of light that comes through the portals in a given direction of travel, a unit vector: light of a
     /// source that is infinitely far away. The density is per area perpendicular to the direction.
     ///
-    /// `None` as for [`Self::sample`].
+    /// Returns `None` as [`Self::sample`] does.
+    #[must_use]
     pub fn sample_distant(&self, direction: Vec3, u: [f32; 3]) -> Option<EmissionSample> {
         let [choice, b1, b2] = variates(u);
         self.sample_beam(direction, 1.0, choice, [b1, b2])
     }
 
-    /// Density with which [`Self::sample`] draws the ray that starts at a point of a light in a unit direction, in
-    /// which light travels: per solid angle, and per area perpendicular to the direction. Zero where it cannot.
+    /// Returns the density with which [`Self::sample`] draws the ray that starts at a point of a light in a unit direction,
+    /// in which light travels: per solid angle, and per area perpendicular to the direction. Zero where it cannot.
+    #[must_use]
     pub fn pdf(&self, hit: &Hit, direction: Vec3) -> f32 {
-        let density = self.lights.leaf(hit.triangle).map_or(0.0, |leaf| {
-            let directions = self.directions.pdf(&self.lights.environment, -direction);
+        let density = self.scene.lights.leaf(hit.triangle).map_or(0.0, |leaf| {
+            let directions = self.directions.pdf(&self.scene.environment, -direction);
             self.density(leaf, Lattice::from_barycentrics(hit.barycentrics), direction, directions)
         });
         to_finite(density)
     }
 
-    /// Density with which [`Self::sample`] draws a ray that arrives at a point from a unit direction `towards` the
-    /// light, whichever light it started from: the sum over all points that the line crosses. In the measure
+    /// Returns the density with which [`Self::sample`] draws a ray that arrives at a point from a unit direction `towards`
+    /// the light, whichever light it started from: the sum over all points that the line crosses. In the measure
     /// of [`Self::pdf`]; times the cosine at a surface it is a density per area of that surface.
+    #[must_use]
     pub fn pdf_ray(&self, position: Vec3, towards: Vec3) -> f32 {
-        let directions = self.directions.pdf(&self.lights.environment, towards);
+        to_finite(self.ray_density(position, towards, None))
+    }
+
+    /// Returns [`Self::pdf_ray`] of a ray that [`Self::sample`] has drawn, at the point where it has landed.
+    ///
+    /// The point that the ray started from counts with its own density whatever rounding does to the line, so the result is
+    /// never below `ray.pdf`. A ray that starts at a triangle's edge could miss it on the way back.
+    #[must_use]
+    pub fn pdf_sample_ray(&self, ray: &EmissionSample, landed: Vec3) -> f32 {
+        let own = self.scene.lights.leaf(ray.hit.triangle);
+        to_finite(f64::from(ray.pdf) + self.ray_density(landed, -ray.direction, own))
+    }
+
+    /// Sum of the densities of all points along a line, except those of one light.
+    fn ray_density(&self, position: Vec3, towards: Vec3, except: Option<u32>) -> f64 {
+        let directions = self.directions.pdf(&self.scene.environment, towards);
         let mut density = 0.0;
-        self.lights.tlas.cross(position, towards, |leaf| {
-            let vertices = self.lights.triangles[leaf as usize].triangle().exactly_relative_to(position);
-            if let Some(hit) = geometry::intersect(vertices, towards) {
-                density += self.density(leaf, Lattice::from_barycentrics(hit), -towards, directions);
-            }
-        });
-        to_finite(density)
+        self.scene.cross(
+            position,
+            towards,
+            |leaf| Some(leaf) != except,
+            |leaf, point| density += self.density(leaf, point, -towards, directions),
+        );
+        density
     }
 
-    /// Density, per area perpendicular to the unit direction of travel, with which [`Self::sample_distant`] draws a
-    /// point of a portal. Zero where it cannot.
+    /// Returns the density, per area perpendicular to the unit direction of travel, with which [`Self::sample_distant`]
+    /// draws a point of a portal. Zero where it cannot.
+    #[must_use]
     pub fn pdf_distant(&self, direction: Vec3, hit: &Hit) -> f32 {
-        let density = self
-            .lights
-            .leaf(hit.triangle)
-            .map_or(0.0, |leaf| self.beam_density(leaf, Lattice::from_barycentrics(hit.barycentrics), direction));
-        to_finite(density)
+        let point = Lattice::from_barycentrics(hit.barycentrics);
+        let leaf = self.scene.lights.leaf(hit.triangle);
+        to_finite(leaf.map_or(0.0, |leaf| self.beam_density(leaf, point, direction)))
     }
 
-    fn density(&self, leaf: u32, place: Lattice, direction: Vec3, directions: f64) -> f64 {
-        if self.lights.is_directional(&self.lights.triangles[leaf as usize]) {
-            self.shares[1] * directions * self.beam_density(leaf, place, direction)
+    fn density(&self, leaf: u32, point: Lattice, direction: Vec3, directions: f64) -> f64 {
+        if is_directional(&self.scene, self.scene.lights.light(leaf)) {
+            self.shares[1] * directions * self.beam_density(leaf, point, direction)
         } else {
-            self.diffuse_density(leaf, place, direction)
+            self.diffuse_density(leaf, point, direction)
         }
     }
 
     fn sample_diffuse(&self, mut u: Variate, point: [Variate; 2], direction: [Variate; 2]) -> Option<EmissionSample> {
-        let (leaf, pmf) = self.lights.tlas.sample_outgoing(&Outgoing::Diffuse, &mut u)?;
-        let start = self.start(leaf, &mut Draw::new(point), Draw::point)?;
+        let (leaf, pmf) = self.scene.tlas.sample_outgoing(&Outgoing::Diffuse, &mut u)?;
+        let start = self.scene.lights.sample_start(leaf, point)?;
         let side = if start.two_sided && u.value() < 0.5 { -start.normal } else { start.normal };
         let pdf = self.shares[0] * pmf * start.pdf_area * per_direction(start.two_sided);
         Some(self.ray(leaf, &start, cosine_direction(side, direction), pdf, pmf))
     }
 
-    fn diffuse_density(&self, leaf: u32, place: Lattice, direction: Vec3) -> f64 {
-        let Some(start) = self.start(leaf, &mut Follow::new(place), |_, _| place) else { return 0.0 };
+    fn diffuse_density(&self, leaf: u32, point: Lattice, direction: Vec3) -> f64 {
+        let Some(start) = self.scene.lights.start_at(leaf, point) else { return 0.0 };
         if !start.two_sided && start.normal.dot(direction) <= 0.0 {
             return 0.0;
         }
-        let pmf = self.lights.tlas.pmf_outgoing(leaf, &Outgoing::Diffuse);
+        let pmf = self.scene.tlas.pmf_outgoing(leaf, &Outgoing::Diffuse);
         self.shares[0] * pmf * start.pdf_area * per_direction(start.two_sided)
     }
 
@@ -210,21 +192,23 @@ impl<const N: usize> Emission<'_, N> {
         mut u: Variate,
         point: [Variate; 2],
     ) -> Option<EmissionSample> {
-        let (leaf, pmf) = self.lights.tlas.sample_outgoing(&self.lights.beam(direction, [0.0, 1.0]), &mut u)?;
-        let start = self.start(leaf, &mut Draw::new(point), Draw::point)?;
+        let beam = beam(&self.scene, direction, [0.0, 1.0]);
+        let (leaf, pmf) = self.scene.tlas.sample_outgoing(&beam, &mut u)?;
+        let start = self.scene.lights.sample_start(leaf, point)?;
         let cosine = self.beam_cosine(leaf, &start, direction)?;
         Some(self.ray(leaf, &start, direction, direction_pdf * pmf * start.pdf_area / cosine, pmf))
     }
 
-    fn beam_density(&self, leaf: u32, place: Lattice, direction: Vec3) -> f64 {
-        let Some(start) = self.start(leaf, &mut Follow::new(place), |_, _| place) else { return 0.0 };
+    fn beam_density(&self, leaf: u32, point: Lattice, direction: Vec3) -> f64 {
+        let Some(start) = self.scene.lights.start_at(leaf, point) else { return 0.0 };
         let Some(cosine) = self.beam_cosine(leaf, &start, direction) else { return 0.0 };
-        self.lights.tlas.pmf_outgoing(leaf, &self.lights.beam(direction, [0.0, 1.0])) * start.pdf_area / cosine
+        let beam = beam(&self.scene, direction, [0.0, 1.0]);
+        self.scene.tlas.pmf_outgoing(leaf, &beam) * start.pdf_area / cosine
     }
 
     /// Area perpendicular to a beam per area of a portal; `None` for what the beam does not pass.
-    fn beam_cosine(&self, leaf: u32, start: &Start, direction: Vec3) -> Option<f64> {
-        if !self.lights.triangles[leaf as usize].is_portal() {
+    fn beam_cosine(&self, leaf: u32, start: &EmissionStart, direction: Vec3) -> Option<f64> {
+        if !self.scene.lights.light(leaf).is_portal() {
             return None;
         }
         let cosine = start.normal.as_dvec3().dot(direction.as_dvec3());
@@ -232,30 +216,9 @@ impl<const N: usize> Emission<'_, N> {
         (cosine > 0.0).then_some(cosine)
     }
 
-    /// A point of a triangle by the averages of its texture, as a guide leads.
-    fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, LatticeCell) -> Lattice) -> Option<Start> {
-        let light = &self.lights.triangles[leaf as usize];
-        if self.lights.scale(light) == 0.0 {
-            return None;
-        }
-        let triangle = light.triangle();
-        let (normal, area) = triangle.normal_and_area()?;
-        let (cell, pmf) = blas::descend(self.lights.cells, light.root, &Everywhere, guide)?;
-        let place = point(guide, cell);
-        let [b1, b2] = place.to_barycentrics().map(f64::from);
-        let [v0, v1, v2] = triangle.exactly_relative_to(Vec3::ZERO);
-        Some(Start {
-            place,
-            position: v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2,
-            normal,
-            two_sided: light.is_two_sided(),
-            pdf_area: pmf / (f64::from(area) * f64::from(cell.area())),
-        })
-    }
-
-    fn ray(&self, leaf: u32, start: &Start, direction: Vec3, pdf: f64, pmf: f64) -> EmissionSample {
+    fn ray(&self, leaf: u32, start: &EmissionStart, direction: Vec3, pdf: f64, pmf: f64) -> EmissionSample {
         EmissionSample {
-            hit: Hit { triangle: self.lights.id(leaf), barycentrics: start.place.to_barycentrics() },
+            hit: Hit { triangle: self.scene.lights.id(leaf), barycentrics: start.point.to_barycentrics() },
             position: start.position.as_vec3(),
             normal: start.normal,
             direction,
@@ -265,13 +228,33 @@ impl<const N: usize> Emission<'_, N> {
     }
 }
 
-/// Where a ray starts.
-struct Start {
-    place: Lattice,
-    position: DVec3,
-    normal: Vec3,
-    two_sided: bool,
-    pdf_area: f64,
+/// What comes through portals in a cone of directions of travel, of which sine and cosine of the half angle are given.
+fn beam(scene: &LightScene<'_>, direction: Vec3, spread: [f32; 2]) -> Outgoing {
+    Outgoing::Beam(Beam { direction, spread, portals_apart: !scene.environment.is_constant() })
+}
+
+/// What all lights send out, in units of the sum of their energies.
+fn outgoing_of_all(scene: &LightScene<'_>, outgoing: &Outgoing) -> f32 {
+    let of_one = || if scene.lights.len() == 1 { outgoing_of_one(scene, outgoing) } else { 0.0 };
+    scene.tlas.outgoing(outgoing).unwrap_or_else(of_one)
+}
+
+/// What the only light sends out, in units of its energy.
+fn outgoing_of_one(scene: &LightScene<'_>, outgoing: &Outgoing) -> f32 {
+    let light = scene.lights.light(0);
+    match outgoing {
+        Outgoing::Diffuse => f32::from(u8::from(!is_directional(scene, light))),
+        Outgoing::Beam(beam) if is_directional(scene, light) || !beam.portals_apart => {
+            let (bounds, moments) = light.bounds(false, |_| 1.0);
+            beam.projection(bounds.normals.axis, [0.0, 1.0], moments.normal, bounds.two_sided)
+        }
+        Outgoing::Beam(_) => 0.0,
+    }
+}
+
+/// Whether what a light sends depends on the direction it is seen from.
+fn is_directional(scene: &LightScene<'_>, light: Light<'_>) -> bool {
+    light.is_portal() && !scene.environment.is_constant()
 }
 
 /// One variate for each number of a sample.
@@ -285,7 +268,7 @@ fn per_direction(two_sided: bool) -> f64 {
     f64::from(if two_sided { 0.5 * FRAC_1_PI } else { FRAC_1_PI })
 }
 
-/// A direction around a unit normal with a density of its cosine over π (Malley's method; pbrt, section A.5.3).
+/// Returns a direction around a unit normal with a density of its cosine over π (Malley's method; pbrt, section A.5.3).
 fn cosine_direction(normal: Vec3, u: [Variate; 2]) -> Vec3 {
     let [u1, u2] = u.map(|u| u.value_f32());
     let (sin_phi, cos_phi) = math::sin_cos(TAU * u2);

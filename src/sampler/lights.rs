@@ -3,206 +3,154 @@
 use alloc::vec::Vec;
 
 use super::builder::LightSamplerBuilder;
-use super::energy::Scales;
-use super::mesh::mesh_of;
-use crate::blas;
+use super::emission::Emission;
+use super::point::PointSampler;
 use crate::env::{Environment, EnvironmentView};
-use crate::light::{Illumination, LightTriangle, Lit};
-use crate::math::{at_least, only_if};
-use crate::record::{ShadingPoint, TriangleId};
-use crate::tlas::{self, Tlas, TlasView};
+use crate::error::Error;
+use crate::light::Lights;
+use crate::receiver::ShadingPoint;
+use crate::record::LightSample;
+use crate::technique::LightScene;
+use crate::tlas::Tlas;
 
-/// Marks a triangle that is not in the tree because it sends nothing, whatever its shape.
-pub(super) const NO_LEAF: u32 = u32::MAX;
-/// Marks a triangle that is not in the tree because it has no area.
-pub(super) const NO_AREA: u32 = u32::MAX - 1;
-
-/// All lights of a scene, ready to be sampled. `N` is the arity of the tree over triangles (4, 8 or 16).
-/// The wider a tree, the better its choices; on machines without AVX, 8 may be faster than the default of 16.
+/// All lights of a scene, ready to be sampled.
 ///
-/// All that a shading point needs works on [`LightSamplerView`], which borrows plain data; the methods here forward
-/// to it.
+/// [`Self::at`] is the door to samples and densities. Sampling reads and never writes, so all threads share one sampler.
 #[derive(Clone, Debug)]
-pub struct LightSampler<const N: usize = 16> {
-    pub(super) tlas: Tlas<N>,
-    /// In the order of the tree's leaves.
-    pub(super) triangles: Vec<LightTriangle>,
-    pub(super) cells: Vec<blas::CellBlock>,
-    /// Where the triangles of each mesh start in `leaves`, and their number at the end.
-    pub(super) meshes: Vec<u32>,
-    /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`].
-    pub(super) leaves: Vec<u32>,
-    /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
-    pub(super) scales: Vec<f32>,
+pub struct LightSampler {
+    pub(super) tlas: Tlas,
+    pub(super) lights: Lights,
     pub(super) environment: Environment,
-    pub(super) illumination: Illumination,
-    /// Energy of all triangles together, without the suns: weight times area, times mean radiance for portals. Zero
-    /// only if nothing is sent.
-    pub(super) energy: f32,
-    /// Whether any triangle is a portal.
-    pub(super) portals: bool,
-    /// What the tree costs, now and as it was built: see [`Self::decay`].
+    /// Cost of the tree now: see [`Self::decay`].
     pub(super) cost: f64,
+    /// Cost of the tree as it was built.
     pub(super) cost_at_build: f64,
 }
 
 /// All lights of a scene in borrowed memory: plain data that can be mapped from a file or shared between processes.
 #[derive(Clone, Copy, Debug)]
-pub struct LightSamplerView<'a, const N: usize = 16> {
-    pub(super) tlas: TlasView<'a, N>,
-    pub(super) triangles: &'a [LightTriangle],
-    pub(super) cells: &'a [blas::CellBlock],
-    pub(super) meshes: &'a [u32],
-    pub(super) leaves: &'a [u32],
-    pub(super) scales: &'a [f32],
-    pub(super) environment: EnvironmentView<'a>,
-    pub(super) illumination: Illumination,
-    pub(super) energy: f32,
-    pub(super) portals: bool,
+pub struct LightSamplerView<'a> {
+    pub(super) scene: LightScene<'a>,
+}
+
+/// Numbers of bytes that the structures of a sampler take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ByteSizes {
+    /// Tree over the lights.
+    pub light_tree: usize,
+    /// The lights themselves, and the ways from ids to lights.
+    pub lights: usize,
+    /// Trees over textures.
+    pub texture_trees: usize,
+    /// Environment.
+    pub environment: usize,
+}
+
+impl ByteSizes {
+    /// Returns the sum of all parts.
+    #[must_use]
+    pub const fn total(&self) -> usize {
+        self.light_tree + self.lights + self.texture_trees + self.environment
+    }
 }
 
 impl LightSampler {
-    /// Starts a sampler of the default arities.
+    /// Returns a builder without lights, whose environment is white.
     pub fn builder<'a>() -> LightSamplerBuilder<'a> {
         LightSamplerBuilder::new()
     }
-}
 
-impl<const N: usize> LightSampler<N> {
-    /// The same lights in borrowed form.
+    /// Returns the same lights in borrowed form.
     #[inline]
-    pub fn as_view(&self) -> LightSamplerView<'_, N> {
-        LightSamplerView {
-            tlas: self.tlas.view(),
-            triangles: &self.triangles,
-            cells: &self.cells,
-            meshes: &self.meshes,
-            leaves: &self.leaves,
-            scales: &self.scales,
-            environment: self.environment.as_view(),
-            illumination: self.illumination,
-            energy: self.energy,
-            portals: self.portals,
-        }
+    #[must_use]
+    pub fn as_view(&self) -> LightSamplerView<'_> {
+        LightSamplerView { scene: self.scene() }
     }
 
-    /// The environment, for its own sampling.
+    #[inline(always)]
+    pub(super) fn scene(&self) -> LightScene<'_> {
+        LightScene { tlas: self.tlas.view(), lights: self.lights.view(), environment: self.environment.as_view() }
+    }
+
+    /// Returns the lights as seen from a shading point.
+    #[inline(always)]
+    pub fn at(&self, x: &ShadingPoint) -> PointSampler<'_> {
+        PointSampler::new(self.scene(), x)
+    }
+
+    /// Draws one sample for each shading point and its random numbers: see [`LightSamplerView::sample_many`].
+    pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
+        self.as_view().sample_many(queries, samples);
+    }
+
+    /// Prepares to draw rays of light that leave the lights: see [`LightSamplerView::emission`].
+    pub fn emission(&self) -> Emission<'_> {
+        self.as_view().emission()
+    }
+
+    /// Returns the environment, for its own sampling.
+    #[must_use]
     pub fn environment(&self) -> &Environment {
         &self.environment
     }
 
-    /// Turns the environment; nothing is built anew.
+    /// Rotates the environment at no cost: nothing is rebuilt.
     ///
     /// # Errors
     ///
     /// As [`Environment::set_rotation`].
-    pub fn set_environment_rotation(&mut self, rotation: glam::Mat3) -> Result<(), crate::Error> {
+    pub fn set_environment_rotation(&mut self, rotation: glam::Mat3) -> Result<(), Error> {
         self.environment.set_rotation(rotation)
     }
-}
 
-impl<'a, const N: usize> LightSamplerView<'a, N> {
-    /// The environment, for its own sampling.
-    pub fn environment(&self) -> EnvironmentView<'a> {
-        self.environment
-    }
-
-    /// Number of triangles that can send light.
+    /// Returns the number of triangles that can send light.
+    #[must_use]
     pub fn light_count(&self) -> usize {
-        self.triangles.len()
+        self.as_view().light_count()
     }
 
-    /// Number of bytes that the structures take, by part: tree over triangles, triangles, trees over textures,
-    /// environment.
-    pub fn bytes(&self) -> [usize; 4] {
-        let tlas = size_of_val(self.tlas.nodes)
-            + size_of_val(self.tlas.parents)
-            + size_of_val(self.tlas.spreads)
-            + size_of_val(self.tlas.leaves);
-        let triangles = size_of_val(self.triangles)
-            + size_of_val(self.meshes)
-            + size_of_val(self.leaves)
-            + size_of_val(self.scales);
-        let parts = self.environment.parts();
-        let environment = size_of_val(&parts.header)
-            + size_of_val(parts.means)
-            + size_of_val(parts.ranges)
-            + size_of_val(parts.filtered_means)
-            + size_of_val(parts.suns)
-            + size_of_val(parts.sun_texels);
-        [tlas, triangles, size_of_val(self.cells), environment]
+    /// Returns the number of bytes that the structures take.
+    #[must_use]
+    pub fn bytes(&self) -> ByteSizes {
+        self.as_view().bytes()
     }
 
-    /// Leaf of a triangle; `None` for one that sends nothing or that was never added.
-    pub(super) fn leaf(&self, id: TriangleId) -> Option<u32> {
-        let start = *self.meshes.get(id.mesh as usize)?;
-        let end = *self.meshes.get(id.mesh as usize + 1)?;
-        let index = start.checked_add(id.triangle).filter(|index| *index < end)?;
-        self.leaves.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
-    }
-
-    /// The triangle in a leaf.
-    pub(super) fn id(&self, leaf: u32) -> TriangleId {
-        let place = self.triangles[leaf as usize].place();
-        let mesh = mesh_of(self.meshes, place);
-        TriangleId { mesh: mesh as u32, triangle: place.wrapping_sub(self.meshes[mesh]) }
-    }
-
-    /// What the weight of a triangle is multiplied by.
-    #[inline]
-    pub(super) fn scale(&self, light: &LightTriangle) -> f32 {
-        Scales { factors: self.scales, meshes: self.meshes }.of(light)
-    }
-
-    /// A triangle as seen from a shading point; `None` if nothing can arrive from it.
-    #[inline]
-    pub(super) fn lit(&self, leaf: u32, x: &ShadingPoint) -> Option<Lit<'_>> {
-        Lit::new(&self.triangles[leaf as usize], x, self.illumination, self.directional_environment())
-    }
-
-    /// Whether anything is sent at all.
-    pub(super) fn sends(&self) -> bool {
-        self.energy > 0.0
-    }
-
-    pub(super) fn has_portals(&self) -> bool {
-        self.portals
-    }
-
-    /// The environment, if what it shows depends on the direction.
-    fn directional_environment(&self) -> Option<&EnvironmentView<'a>> {
-        (!self.environment.is_constant()).then_some(&self.environment)
-    }
-
-    /// What the tree over triangles asks for at a shading point.
-    pub(super) fn scene<'s>(&'s self, x: &'s ShadingPoint) -> Scene<'s> {
-        Scene { x, triangles: self.triangles, environment: &self.environment, sends: self.sends() }
+    /// Returns everything as bytes: see [`LightSamplerView::to_bytes`].
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.as_view().to_bytes()
     }
 }
 
-/// The tree's window on triangles and environment.
-pub(super) struct Scene<'a> {
-    x: &'a ShadingPoint,
-    triangles: &'a [LightTriangle],
-    environment: &'a EnvironmentView<'a>,
-    /// Whether any triangle sends anything.
-    sends: bool,
-}
-
-impl tlas::Scene for Scene<'_> {
+impl<'a> LightSamplerView<'a> {
+    /// Returns the lights as seen from a shading point.
     #[inline(always)]
-    fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N] {
-        let mean = self.environment.mean_without_suns();
-        if mean <= 0.0 {
-            return [0.0; N];
-        }
-        // What is not black stays so, however bright the rest is.
-        let relative = |value: f32| only_if(value > 0.0, at_least(value / mean, f32::MIN_POSITIVE));
-        self.environment.averages_of_balls(centers, radii, set).map(relative)
+    pub fn at(&self, x: &ShadingPoint) -> PointSampler<'a> {
+        PointSampler::new(self.scene, x)
     }
 
-    #[inline]
-    fn is_visible(&self, leaf: u32) -> bool {
-        self.sends && self.triangles[leaf as usize].is_visible(self.x)
+    /// Returns the environment, for its own sampling.
+    #[must_use]
+    pub fn environment(&self) -> EnvironmentView<'a> {
+        self.scene.environment
+    }
+
+    /// Returns the number of triangles that can send light.
+    #[must_use]
+    pub fn light_count(&self) -> usize {
+        self.scene.lights.len()
+    }
+
+    /// Returns the number of bytes that the structures take.
+    #[must_use]
+    pub fn bytes(&self) -> ByteSizes {
+        let texture_trees = size_of_val(self.scene.lights.cells);
+        ByteSizes {
+            light_tree: self.scene.tlas.byte_size(),
+            lights: self.scene.lights.byte_size() - texture_trees,
+            texture_trees,
+            environment: self.scene.environment.byte_size(),
+        }
     }
 }

@@ -2,33 +2,26 @@
 
 use smallvec::SmallVec;
 
+use super::lights::LightSamplerView;
 #[cfg(doc)]
-use super::at::PointSampler;
-use super::lights::{LightSampler, LightSamplerView, Scene};
-use super::sample::variates;
-use crate::record::{LightSample, ShadingPoint};
-use crate::simd::prefetch;
-use crate::tlas::{TURNS, Walk};
+use super::point::PointSampler;
+use crate::light::LightKind;
+use crate::receiver::ShadingPoint;
+use crate::record::LightSample;
+use crate::technique::{Variates, Viewpoint};
+use crate::tlas::{Descent, TURNS};
 use crate::warp::Variate;
 
-impl<const N: usize> LightSampler<N> {
-    /// See [`LightSamplerView::sample_many`].
-    pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        self.as_view().sample_many(queries, samples);
-    }
-}
-
-impl<const N: usize> LightSamplerView<'_, N> {
-    /// Draws one sample for each shading point and its random numbers, the same as
-    /// [`PointSampler::sample`] draws, but faster: a walk down a large tree mostly waits,
-    /// and here several take turns.
+impl LightSamplerView<'_> {
+    /// Draws one sample for each shading point and its random numbers.
     ///
-    /// Where one slice is longer, the rest of it is left alone.
+    /// The samples are those that [`PointSampler::sample`] draws, but faster: a walk down a large tree mostly waits for
+    /// memory, and here several walks are interleaved. Where one slice is longer, the rest of it is left alone.
     pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        // A sample is mostly the search for suns, where there are any.
-        if self.has_suns() {
+        // With bright features a sample is mostly the search for them.
+        if self.scene.has_features() {
             let each = queries.iter().zip(samples);
-            return each.for_each(|((x, u), sample)| *sample = self.sample(x, *u));
+            return each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));
         }
         for (queries, samples) in queries.chunks(TURNS).zip(samples.chunks_mut(TURNS)) {
             self.sample_few(queries, samples);
@@ -36,23 +29,23 @@ impl<const N: usize> LightSamplerView<'_, N> {
     }
 
     fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        let mut walks = SmallVec::<[Walk<Scene<'_>>; TURNS]>::new();
+        let mut walks = SmallVec::<[Descent<Viewpoint<'_>>; TURNS]>::new();
         let mut points = SmallVec::<[[Variate; 2]; TURNS]>::new();
         for (x, u) in queries {
-            let [choice, point @ ..] = variates(*u);
-            walks.push(Walk::new(x, self.scene(x), choice));
+            let Variates { choice, point } = Variates::new(*u);
+            walks.push(Descent::new(x, Viewpoint { scene: self.scene, x: *x }, choice));
             points.push(point);
         }
-        self.tlas.sample_many(&mut walks);
-        for (leaf, _) in walks.iter().filter_map(Walk::leaf) {
-            prefetch(&self.triangles[leaf as usize]);
+        self.scene.tlas.sample_many(&mut walks);
+        for (leaf, _) in walks.iter().filter_map(Descent::leaf) {
+            self.scene.lights.light(leaf).prefetch();
         }
         let Some((first, _)) = queries.first() else { return };
-        // Without suns, nothing but the point differs.
+        // Without features, nothing but the point differs.
         let mut at = self.at(first);
         for (i, sample) in samples.iter_mut().enumerate().take(walks.len()) {
-            at.x = queries[i].0;
-            *sample = walks[i].leaf().and_then(|(leaf, pmf)| at.sample_on(leaf, pmf, points[i]));
+            at.move_to(&queries[i].0);
+            *sample = walks[i].leaf().and_then(|chosen| at.sample_on(chosen, points[i]));
         }
     }
 }

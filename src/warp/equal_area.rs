@@ -16,7 +16,7 @@ use glam::{Vec2, Vec3};
 ///
 /// Within 2.5e-7 of the exact map, and within 2.5e-7 of unit length.
 #[inline]
-pub fn square_to_sphere(point: Vec2) -> Vec3 {
+pub(crate) fn square_to_sphere(point: Vec2) -> Vec3 {
     let (x, y) = (limit(point.x, 1.0), limit(point.y, 1.0));
     // Distances from the centre lines and from the nearest edges, in units of half the side. None of them
     // cancels: 2x - 1 rounds at most once, 1 - x is exact where x > 1/2.
@@ -44,7 +44,7 @@ pub fn square_to_sphere(point: Vec2) -> Vec3 {
 ///
 /// Any vector gives a point of the square; only for unit vectors it is the right one.
 #[inline(always)]
-pub fn sphere_to_square(direction: Vec3) -> Vec2 {
+pub(crate) fn sphere_to_square(direction: Vec3) -> Vec2 {
     let (x, y, z) = (direction.x.abs(), direction.y.abs(), direction.z.abs());
     // 1 - |z| = (x² + y²) / (1 + |z|): no cancellation near the poles.
     let r = limit(sqrt((x * x + y * y) / (1.0 + z)), 1.0);

@@ -85,6 +85,6 @@ impl<const N: usize> Method for Fanlight<'_, N> {
     }
 
     fn draws_suns_apart(&self) -> bool {
-        self.scene.sky.is_some() && !self.sampler.environment().as_view().suns().is_empty()
+        self.scene.sky.as_ref().is_some_and(|sky| !sky.sun.is_empty())
     }
 }

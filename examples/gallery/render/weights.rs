@@ -1,6 +1,6 @@
 //! What guides `fanlight`: weights of meshes, and the sky.
 
-use fanlight::{Environment, Filter, LightSamplerBuilder, Mesh, Texture, Weight};
+use fanlight::{Environment, EnvironmentImage, Filter, LightSamplerBuilder, Mesh, Texture, Weight};
 
 use super::Error;
 use super::bitmap::Bitmap;
@@ -11,12 +11,12 @@ use super::sky::LUMINANCE;
 /// One number a texel guides well enough; the radiance itself is looked up in RGB, interpolated in the same way.
 pub(super) fn environment(model: &Model) -> Result<Environment, Error> {
     let Some(sky) = &model.sky else { return Ok(Environment::constant(0.0)?) };
-    let (width, height, luminance, filter) = (sky.width(), sky.height(), sky.luminance(), Filter::Bilinear);
-    let environment = match model.guide_texels {
-        None => Environment::from_lat_long(width, height, &luminance, filter)?,
-        Some(size) => Environment::from_lat_long_with_size(width, height, &luminance, filter, size)?,
-    };
-    Ok(environment.with_rotation(Environment::Y_UP_LAT_LONG)?)
+    let luminance = sky.luminance();
+    let mut image = EnvironmentImage::lat_long(sky.width(), sky.height(), &luminance).filter(Filter::Bilinear);
+    if let Some(size) = model.guide_texels {
+        image = image.resolution(size);
+    }
+    Ok(Environment::new(&image)?.with_rotation(Environment::Y_UP_LAT_LONG)?)
 }
 
 /// A mesh's weight, one number or an image of them.

@@ -4,7 +4,7 @@ use glam::Vec2;
 
 use crate::blas::barycentric::{LATTICE, LatticeCell};
 use crate::blas::build::texture::Texture;
-use crate::error::{Error, Kind};
+use crate::error::{Error, ErrorKind};
 use crate::math::{floor64, sqrt64};
 
 /// Texture coordinates may be this large. Up to here texel indices stay exact, and beyond it an `f32` cannot tell the
@@ -17,7 +17,7 @@ pub(crate) fn check_uv(mesh: usize, vertex: usize, uv: Vec2) -> Result<(), Error
     if uv.x.abs() <= UV_LIMIT && uv.y.abs() <= UV_LIMIT {
         Ok(())
     } else {
-        Err(Error(Kind::TextureCoordinate { mesh, vertex, value: uv.to_array(), limit: UV_LIMIT }))
+        Err(Error(ErrorKind::TextureCoordinate { mesh, vertex, value: uv.to_array(), limit: UV_LIMIT }))
     }
 }
 

@@ -9,7 +9,7 @@ use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_
 use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
 use crate::blas::build::touched::TexelRange;
 use crate::blas::node::{CELLS, CellBlock, Root, storable};
-use crate::error::{Error, Kind};
+use crate::error::{Error, ErrorKind};
 use crate::geometry::subdivision_centers;
 
 /// Memory for all triangles with the same function together; the first ones take what they need.
@@ -229,12 +229,12 @@ struct Fault {
 }
 
 impl Fault {
-    fn kind(self, mesh: usize) -> Kind {
+    fn kind(self, mesh: usize) -> ErrorKind {
         let Self { region, bounds, weight } = self;
         let region = region.map(|corner| corner.to_array());
         match weight {
-            None => Kind::ProceduralBounds { mesh, region, bounds },
-            Some((uv, value)) => Kind::ProceduralWeight { mesh, uv: uv.to_array(), value, region, bounds },
+            None => ErrorKind::ProceduralBounds { mesh, region, bounds },
+            Some((uv, value)) => ErrorKind::ProceduralWeight { mesh, uv: uv.to_array(), value, region, bounds },
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The weight image that a host passes in.
 
-use crate::error::{Error, Kind};
+use crate::error::{Error, ErrorKind};
 use crate::math::floor64;
 use crate::record::{Filter, Wrap};
 
@@ -35,13 +35,13 @@ impl<'a> Texture<'a> {
     pub fn new(width: usize, height: usize, texels: &'a [f32]) -> Result<Self, Error> {
         let what = "texture";
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-            return Err(Error(Kind::ImageSize { what, width, height, limit: MAX_SIDE }));
+            return Err(Error(ErrorKind::ImageSize { what, width, height, limit: MAX_SIDE }));
         }
         if texels.len() != width * height {
-            return Err(Error(Kind::TexelCount { what, width, height, found: texels.len() }));
+            return Err(Error(ErrorKind::TexelCount { what, width, height, found: texels.len() }));
         }
         if let Some(at) = texels.iter().position(|t| !(t.is_finite() && *t >= 0.0)) {
-            return Err(Error(Kind::Texel { what, x: at % width, y: at / width, value: texels[at] }));
+            return Err(Error(ErrorKind::Texel { what, x: at % width, y: at / width, value: texels[at] }));
         }
         let wrap = [Wrap::default(); 2];
         Ok(Self { width: width as u32, height: height as u32, texels, filter: Filter::default(), wrap })
@@ -133,7 +133,7 @@ mod tests {
         assert!(Texture::new(2, 2, &[0.0; 3]).is_err());
         for bad in [f32::NAN, f32::INFINITY, -1e-30] {
             let error = Texture::new(2, 2, &[0.0, 0.0, 0.0, bad]).unwrap_err();
-            assert!(matches!(error.0, Kind::Texel { x: 1, y: 1, .. }), "{error}");
+            assert!(matches!(error.0, ErrorKind::Texel { x: 1, y: 1, .. }), "{error}");
         }
     }
 

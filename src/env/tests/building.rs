@@ -1,12 +1,13 @@
 //! From images to equal-area ones.
 
 use super::*;
-use crate::env::source::{Edges, Source};
+use crate::env::source::EnvironmentSource;
+use crate::env::{EnvironmentImage, Poles};
 use core::f64::consts::PI as PI64;
 
 /// Mean over the sphere of a latitude-longitude image as the host sees it.
 fn lat_long_mean(width: usize, height: usize, image: &[f32], filter: Filter) -> f64 {
-    let source = Source::new(width, height, image, Edges::LatLong, filter).unwrap();
+    let source = EnvironmentSource::new(&EnvironmentImage::lat_long(width, height, image).filter(filter)).unwrap();
     let (columns, rows) = (source.columns(), source.rows());
     let mut sum = 0.0;
     for row in 0..rows {
@@ -44,7 +45,9 @@ fn lat_long_flux_of_one_texel_is_kept() {
                     for size in [0, 2, 64] {
                         let environment = match size {
                             0 => Environment::from_lat_long(width, height, &image, filter),
-                            _ => Environment::from_lat_long_with_size(width, height, &image, filter, size),
+                            _ => Environment::new(
+                                &EnvironmentImage::lat_long(width, height, &image).filter(filter).resolution(size),
+                            ),
                         };
                         let expected = lat_long_mean(width, height, &image, filter);
                         let what = alloc::format!("({x}, {y}) of {width} x {height}, {filter:?}, {size}");
@@ -63,7 +66,9 @@ fn equal_area_flux_is_kept() {
         let expected = image.iter().map(|&v| f64::from(v)).sum::<f64>() / (size * size) as f64;
         for filter in [Filter::Nearest, Filter::Bilinear] {
             for resolution in [1, 2, 64] {
-                let found = Environment::from_equal_area_with_size(size, &image, filter, resolution).unwrap();
+                let found =
+                    Environment::new(&EnvironmentImage::equal_area(size, &image).filter(filter).resolution(resolution))
+                        .unwrap();
                 assert_close(found.mean(), expected, 1e-6, "mean");
             }
             assert_close(Environment::from_equal_area(size, &image, filter).unwrap().mean(), expected, 1e-6, "mean");
@@ -94,7 +99,10 @@ fn lit_places_stay_lit_and_all_others_black() {
                 let (x, y) = (pcg.next_u32() as usize % width, pcg.next_u32() as usize % height);
                 for y in [y, 0, height - 1] {
                     let image = one_lit(width, height, x, y).iter().map(|v| v * 1e-30).collect::<Vec<_>>();
-                    let e = Environment::from_lat_long_with_size(width, height, &image, filter, size).unwrap();
+                    let e = Environment::new(
+                        &EnvironmentImage::lat_long(width, height, &image).filter(filter).resolution(size),
+                    )
+                    .unwrap();
                     let reach = if filter == Filter::Nearest { 0.0 } else { 0.5 };
                     for _ in 0..1000 {
                         let u = x as f32 - reach + (1.0 + 2.0 * reach) * (0.001 + 0.998 * pcg.next_f32());
@@ -134,7 +142,9 @@ fn a_black_hemisphere_stays_black() {
 fn pixels_are_where_the_convention_says() {
     let (width, height) = (64, 32);
     let image = noise(width * height, 4);
-    let e = Environment::from_lat_long_with_size(width, height, &image, Filter::Nearest, 1024).unwrap();
+    let e =
+        Environment::new(&EnvironmentImage::lat_long(width, height, &image).filter(Filter::Nearest).resolution(1024))
+            .unwrap();
     let mut y_up = e.clone();
     y_up.set_rotation(Environment::Y_UP_LAT_LONG).unwrap();
     for y in 1..height - 1 {
@@ -216,7 +226,9 @@ fn extremes_of_brightness() {
     for value in [1e30, 1e-30, 1e-38, 1e-45] {
         let mut image = one_lit(64, 32, 10, 3);
         image.iter_mut().for_each(|v| *v *= value);
-        let environment = Environment::from_lat_long_with_size(64, 32, &image, Filter::Bilinear, 2048).unwrap();
+        let environment =
+            Environment::new(&EnvironmentImage::lat_long(64, 32, &image).filter(Filter::Bilinear).resolution(2048))
+                .unwrap();
         assert!(environment.mean() > 0.0 && environment.mean().is_finite());
         let view = environment.as_view();
         assert!(
@@ -249,7 +261,10 @@ fn bad_images_are_refused_by_name() {
         assert!(Environment::from_lat_long(width, height, &vec![1.0; count], Filter::Nearest).is_err());
     }
     for size in [0, 8193, usize::MAX] {
-        assert!(Environment::from_equal_area_with_size(1, &[1.0], Filter::Nearest, size).is_err());
+        assert!(
+            Environment::new(&EnvironmentImage::equal_area(1, &[1.0]).filter(Filter::Nearest).resolution(size))
+                .is_err()
+        );
     }
     for value in [f32::NAN, -1.0, f32::INFINITY, 1e31] {
         assert!(Environment::constant(value).is_err());
@@ -274,5 +289,72 @@ fn only_rotations_rotate() {
         let once = environment.clone().with_rotation(rotation).unwrap().rotation();
         assert!((once - rotation).to_cols_array().iter().all(|e| e.abs() < 2e-6));
         assert_eq!(environment.clone().with_rotation(once).unwrap().rotation(), once);
+    }
+}
+
+/// Value of the texel in which a direction of the environment's frame lies.
+fn texel_in_direction(width: usize, height: usize, image: &[f32], direction: Vec3) -> f64 {
+    let d = direction.as_dvec3();
+    let u = (-d.y.atan2(d.x) / (2.0 * PI64)).rem_euclid(1.0);
+    let v = d.z.clamp(-1.0, 1.0).acos() / PI64;
+    let (x, y) = ((u * width as f64) as usize, (v * height as f64) as usize);
+    f64::from(image[y.min(height - 1) * width + x.min(width - 1)])
+}
+
+/// A host that interpolates between the four texels whose centers are nearest on the sphere, beyond the poles too.
+fn host_across_the_poles(width: usize, height: usize, image: &[f32], u: f64, v: f64) -> f64 {
+    let (x, y) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
+    let (left, top) = (x.floor(), y.floor());
+    let (s, t) = (x - left, y - top);
+    let texel = |i: f64, j: f64| {
+        // A little to both sides: beyond the pole of an image of odd width a center is on a border.
+        let value = |offset: f64| {
+            let (u, v) = ((left + i + 0.5 + offset) / width as f64, (top + j + 0.5) / height as f64);
+            // A negative polar angle leads over the pole.
+            texel_in_direction(width, height, image, lat_long_direction(u as f32, v as f32))
+        };
+        0.5 * (value(-0.01) + value(0.01))
+    };
+    (1.0 - t) * ((1.0 - s) * texel(0.0, 0.0) + s * texel(1.0, 0.0))
+        + t * ((1.0 - s) * texel(0.0, 1.0) + s * texel(1.0, 1.0))
+}
+
+#[test]
+fn rows_beyond_the_poles_are_those_of_the_host() {
+    for (width, height) in [(1, 1), (2, 1), (8, 4), (7, 4), (16, 8)] {
+        let image = noise(width * height, 11);
+        let lat_long = EnvironmentImage::lat_long(width, height, &image).poles(Poles::Across);
+        let source = EnvironmentSource::new(&lat_long).unwrap();
+        let (columns, rows) = (source.columns(), source.rows());
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            // The mean of an interpolated function over a quadrant is its value in the center.
+            let (u, v) = ((column as f64 + 0.5) / columns as f64, (row as f64 + 0.5) / rows as f64);
+            let expected = host_across_the_poles(width, height, &image, u, v);
+            let found = source.cell(column, row);
+            assert!(
+                (found - expected).abs() <= 1e-6 * expected,
+                "{width} x {height}, {column} {row}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn light_reaches_over_a_pole_if_the_host_reads_it_there() {
+    let (width, height) = (16, 8);
+    for (y, v) in [(0, 0.01), (height - 1, 0.99)] {
+        let image = one_lit(width, height, 3, y);
+        for (poles, filter, lit) in [
+            (Poles::Clamp, Filter::Bilinear, false),
+            (Poles::Across, Filter::Bilinear, true),
+            (Poles::Across, Filter::Nearest, false),
+        ] {
+            let image = EnvironmentImage::lat_long(width, height, &image).filter(filter).poles(poles).resolution(256);
+            let environment = Environment::new(&image).unwrap();
+            // Columns 3 + 8: half a turn away.
+            let beyond = lat_long_direction(11.5 / width as f32, v);
+            assert_eq!(environment.radiance(beyond) > 0.0, lit, "{poles:?} {filter:?}");
+            assert!(environment.radiance(lat_long_direction(3.5 / width as f32, v)) > 0.0);
+        }
     }
 }

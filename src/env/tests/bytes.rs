@@ -1,7 +1,9 @@
 //! Environments that were taken apart and put together again.
 
 use super::*;
-use crate::env::{EnvironmentParts, EnvironmentView};
+use crate::env::features::FeatureLimits;
+use crate::env::{BrightFeature, EnvironmentHeader, EnvironmentImage, EnvironmentParts, EnvironmentView, FeatureTexel};
+use crate::warp::Variate;
 
 #[test]
 fn parts_make_the_same_environment() {
@@ -20,7 +22,7 @@ fn parts_that_do_not_fit_are_refused() {
     let view = environment.as_view();
     let parts = view.parts();
     let EnvironmentParts { means, ranges, filtered_means: filtered, .. } = parts;
-    let check = |f: &dyn Fn(&mut crate::EnvironmentHeader)| {
+    let check = |f: &dyn Fn(&mut EnvironmentHeader)| {
         let mut header = parts.header;
         f(&mut header);
         EnvironmentView::from_parts(EnvironmentParts { header, ..parts }).is_err()
@@ -54,17 +56,92 @@ fn parts_that_do_not_fit_are_refused() {
     }
 }
 
+/// Changes the features of an environment, and says whether the result is refused.
+fn is_refused(parts: EnvironmentParts<'_>, change: impl Fn(&mut BrightFeature, &mut [FeatureTexel])) -> bool {
+    let mut features = parts.features.to_vec();
+    let mut feature_texels = parts.feature_texels.to_vec();
+    change(&mut features[0], &mut feature_texels);
+    let parts = EnvironmentParts { features: &features, feature_texels: &feature_texels, ..parts };
+    EnvironmentView::from_parts(parts).is_err()
+}
+
 #[test]
-fn suns_that_are_not_the_image_s_are_refused() {
-    let environment = Environment::from_equal_area(64, &one_lit(64, 64, 40, 15), Filter::Nearest).unwrap();
+fn features_that_cannot_be_sampled_are_refused() {
+    let mut image = one_lit(64, 64, 40, 15);
+    image[15 * 64 + 41] = 3.0;
+    let environment = Environment::from_equal_area(64, &image, Filter::Nearest).unwrap();
     let view = environment.as_view();
     let parts = view.parts();
-    assert_eq!((parts.suns.len(), parts.sun_texels.len()), (1, 1));
-    let mut sun = parts.suns[0];
-    sun.range[1] = 2;
-    assert!(EnvironmentView::from_parts(EnvironmentParts { suns: &[sun], ..parts }).is_err());
-    assert!(EnvironmentView::from_parts(EnvironmentParts { suns: &[], ..parts }).is_err());
-    assert!(EnvironmentView::from_parts(EnvironmentParts { sun_texels: &[], ..parts }).is_err());
-    let header = crate::EnvironmentHeader { cap: 1.0, ..parts.header };
-    assert!(EnvironmentView::from_parts(EnvironmentParts { header, ..parts }).is_err());
+    assert_eq!((parts.features.len(), parts.feature_texels.len()), (1, 2));
+    assert!(!is_refused(parts, |_, _| ()));
+    for value in [f32::NAN, f32::INFINITY, -1.0, 1e31] {
+        let changes: [fn(&mut BrightFeature, &mut [FeatureTexel], f32); 9] = [
+            |feature, _, value| feature.axis[1] = value,
+            |feature, _, value| feature.sin_radius = value,
+            |feature, _, value| feature.power = value,
+            |_, texels, value| texels[1].sum = value,
+            |_, texels, value| texels[0].sum = value,
+            |_, texels, value| texels[0].excess = value,
+            |_, texels, value| texels[0].margin = value,
+            |_, texels, value| texels[1].radius = value,
+            |_, texels, value| texels[1].sides[1][2] = value * 10.0,
+        ];
+        for (i, change) in changes.into_iter().enumerate() {
+            assert!(is_refused(parts, |feature, texels| change(feature, texels, value)), "{i}: {value}");
+        }
+    }
+    assert!(is_refused(parts, |feature, _| feature.range = [0, 3]));
+    assert!(is_refused(parts, |feature, _| feature.range = [1, 2]));
+    assert!(is_refused(parts, |feature, _| feature.range = [0, 1]));
+    assert!(is_refused(parts, |feature, _| feature.range = [0, 0]));
+    assert!(is_refused(parts, |feature, _| feature.range = [u32::MAX, 2]));
+    assert!(is_refused(parts, |feature, _| feature.level = 7));
+    assert!(is_refused(parts, |feature, _| feature.level = u32::MAX));
+    assert!(is_refused(parts, |_, texels| texels[1].texel = texels[0].texel));
+    assert!(is_refused(parts, |_, texels| texels[1].texel = 64 * 64));
+    assert!(is_refused(parts, |_, texels| texels.swap(0, 1)));
+    let features = [parts.features[0]; 9];
+    assert!(EnvironmentView::from_parts(EnvironmentParts { features: &features, ..parts }).is_err());
+    assert!(EnvironmentView::from_parts(EnvironmentParts { features: &[], ..parts }).is_err());
+    assert!(EnvironmentView::from_parts(EnvironmentParts { features: &[], feature_texels: &[], ..parts }).is_err());
+    assert!(EnvironmentView::from_parts(EnvironmentParts { feature_texels: &[], ..parts }).is_err());
+    for cap in [f32::NAN, f32::INFINITY, -1.0, 0.0, 1.5] {
+        let header = EnvironmentHeader { cap, ..parts.header };
+        assert!(EnvironmentView::from_parts(EnvironmentParts { header, ..parts }).is_err(), "{cap}");
+    }
+}
+
+#[test]
+fn environments_of_other_limits_load() {
+    let mut image = noise(64 * 64, 5);
+    for (x, y, value) in [(20, 30, 9e3), (21, 30, 8e3), (50, 9, 2e4), (50, 10, 1e4), (0, 40, 5e3), (7, 7, 2e5)] {
+        image[y * 64 + x] = value;
+    }
+    let mut different = 0;
+    let default = Environment::from_equal_area(64, &image, Filter::Nearest).unwrap();
+    for limits in [
+        FeatureLimits { contrast: 4.0, ..FeatureLimits::default() },
+        FeatureLimits { contrast: 200.0, ..FeatureLimits::default() },
+        FeatureLimits { sin_radius: 1.0, image_share: 0.5, contrast: 1.5, ..FeatureLimits::default() },
+        FeatureLimits { features: 1, ..FeatureLimits::default() },
+        FeatureLimits { texels: 1, sin_radius: 0.5, ..FeatureLimits::default() },
+        FeatureLimits { flux_share: 0.9, ..FeatureLimits::default() },
+    ] {
+        let image = EnvironmentImage::equal_area(64, &image).filter(Filter::Nearest);
+        let environment = Environment::with_limits(&image, &limits).unwrap();
+        different += u32::from(environment != default);
+        let view = EnvironmentView::from_parts(environment.as_view().parts()).unwrap();
+        let mut pcg = Pcg32::new(1, 7);
+        for i in 0..2000 {
+            let sample = view.sample([pcg.next_f32(), pcg.next_f32()]).unwrap();
+            assert!(sample.pdf.is_finite() && sample.pdf > 0.0);
+            for feature in 0..view.bright_features().len() {
+                let u = [Variate::new(pcg.next_f32(), i), Variate::new(pcg.next_f32(), !i)];
+                let direction = view.sample_feature(feature, u);
+                assert!((direction.length() - 1.0).abs() < 1e-6);
+                assert!(view.feature_excess(feature, direction) > 0.0);
+            }
+        }
+    }
+    assert!(different >= 4, "{different}");
 }

@@ -2,8 +2,8 @@
 
 mod building;
 mod bytes;
+mod features;
 mod sampling;
-mod suns;
 
 use super::Environment;
 use crate::record::Filter;

@@ -179,7 +179,7 @@ fn extreme_coordinates() {
         let mut prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap());
         let uv = [Vec2::ZERO, Vec2::new(0.0, bad), Vec2::ONE];
         let error = build(&mut prepared, uv, &mut Vec::new()).unwrap_err();
-        assert!(matches!(error.0, Kind::TextureCoordinate { vertex: 1, .. }), "{error}");
+        assert!(matches!(error.0, ErrorKind::TextureCoordinate { vertex: 1, .. }), "{error}");
     }
 }
 

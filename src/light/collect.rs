@@ -1,0 +1,207 @@
+//! Lights on their way into a sampler: everything is checked as it is added.
+
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
+use super::{Energies, Illumination, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
+use crate::blas::{self, CellBlock, Procedural, RegisteredFunction, Root, Texture, TexturePyramid};
+use crate::error::{Error, ErrorKind};
+use crate::parallel;
+use crate::record::{MeshId, TextureId};
+use crate::tlas::MAX_LEAVES;
+
+/// What a textured weight is read from.
+enum WeightTexture<'a> {
+    Image(TexturePyramid<'a>),
+    Function(RegisteredFunction<'a>),
+}
+
+/// The lights of a scene before there is a tree over them.
+pub(crate) struct LightCollection<'a> {
+    textures: Vec<WeightTexture<'a>>,
+    /// Triangles that may emit light.
+    triangles: Vec<LightTriangle>,
+    /// For every triangle that was added, its index in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
+    indices: Vec<u32>,
+    /// Where each mesh starts in `indices`, and the end.
+    meshes: Vec<u32>,
+    cells: Vec<CellBlock>,
+    /// Trees over textures by texture and the bits of the three uvs.
+    shared: BTreeMap<(u32, [u32; 6]), Root>,
+}
+
+impl<'a> LightCollection<'a> {
+    pub(crate) fn new() -> Self {
+        Self {
+            textures: Vec::new(),
+            triangles: Vec::new(),
+            indices: Vec::new(),
+            meshes: vec![0],
+            cells: Vec::new(),
+            shared: BTreeMap::new(),
+        }
+    }
+
+    /// Numbers of textures, meshes and triangles that were added.
+    pub(crate) fn counts(&self) -> [usize; 3] {
+        [self.textures.len(), self.meshes.len() - 1, self.indices.len()]
+    }
+
+    pub(crate) fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
+        self.push_texture(WeightTexture::Image(TexturePyramid::new(texture)))
+    }
+
+    pub(crate) fn add_procedural(&mut self, function: &'a dyn Procedural) -> TextureId {
+        self.push_texture(WeightTexture::Function(RegisteredFunction::new(function)))
+    }
+
+    fn push_texture(&mut self, texture: WeightTexture<'a>) -> TextureId {
+        self.textures.push(texture);
+        TextureId(self.textures.len() as u32 - 1)
+    }
+
+    /// Adds a mesh. After an error the collection is as it was before.
+    pub(crate) fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<MeshId, Error> {
+        let number = self.meshes.len() - 1;
+        self.check(number, mesh)?;
+        let before = (self.triangles.len(), self.indices.len(), self.cells.len());
+        let function = self.function(mesh).copied();
+        for indices in mesh.indices {
+            if let Err(error) = self.add_triangle(mesh, *indices) {
+                if let (Some(changed), Some(before)) = (self.function(mesh), function) {
+                    *changed = before;
+                }
+                self.triangles.truncate(before.0);
+                self.indices.truncate(before.1);
+                self.cells.truncate(before.2);
+                self.shared.retain(|_, root| blas::holds(&self.cells, *root));
+                return Err(error);
+            }
+        }
+        self.meshes.push(self.indices.len() as u32);
+        Ok(MeshId(number as u32))
+    }
+
+    /// Returns a light by its index among those that may emit.
+    pub(crate) fn light(&self, index: u32) -> Light<'_> {
+        Light::Triangle(&self.triangles[index as usize])
+    }
+
+    /// Returns the energy of all lights together.
+    pub(crate) fn total_energy(&self, energies: &Energies<'_>) -> f64 {
+        energies.total(self.triangles.len(), |i| self.light(i as u32))
+    }
+
+    /// Returns the indices of the lights that emit anything.
+    ///
+    /// # Errors
+    ///
+    /// If there are more of them than leaves in a tree.
+    pub(crate) fn emitting(&self, energies: &Energies<'_>) -> Result<Vec<u32>, Error> {
+        let emits = parallel::collect(self.triangles.len(), |i| energies.energy(self.light(i as u32)) > 0.0);
+        let emitting: Vec<u32> = (0..).zip(emits).filter_map(|(i, emits)| emits.then_some(i)).collect();
+        if emitting.len() > MAX_LEAVES {
+            let count = emitting.len();
+            return Err(Error(ErrorKind::TooMany { what: "light triangles", count, limit: MAX_LEAVES }));
+        }
+        Ok(emitting)
+    }
+
+    /// Returns the lights with these indices, in the order of leaves that is given.
+    pub(crate) fn into_lights(self, illumination: Illumination, leaves: &[u32]) -> Lights {
+        let has_portals = self.triangles.iter().any(LightKind::is_portal);
+        let mut leaf_of_index = vec![NO_LEAF; self.triangles.len()];
+        for (leaf, &index) in (0..).zip(leaves) {
+            leaf_of_index[index as usize] = leaf;
+        }
+        let leaf_of = |&index: &u32| leaf_of_index.get(index as usize).copied().unwrap_or(index);
+        Lights {
+            illumination,
+            energy: 0.0,
+            has_portals,
+            triangles: parallel::collect(leaves.len(), |leaf| self.triangles[leaves[leaf] as usize]),
+            cells: self.cells,
+            leaf_of: self.indices.iter().map(leaf_of).collect(),
+            meshes: self.meshes,
+            scales: Vec::new(),
+        }
+    }
+
+    fn check(&self, number: usize, mesh: &Mesh<'_>) -> Result<(), Error> {
+        let fail = |kind| Err(Error(kind));
+        let vertices = mesh.positions.len();
+        let count = self.indices.len().saturating_add(mesh.indices.len());
+        if count > MAX_LEAVES {
+            return fail(ErrorKind::TooMany { what: "triangles", count, limit: MAX_LEAVES });
+        }
+        check_triangles(number, mesh.positions, mesh.indices)?;
+        match mesh.weight {
+            Weight::Constant(value) if !(0.0..=blas::MAX_AVERAGE).contains(&value) => {
+                fail(ErrorKind::Weight { mesh: number, value, limit: blas::MAX_AVERAGE })
+            }
+            Weight::Constant(_) => Ok(()),
+            Weight::Texture(TextureId(texture)) if texture as usize >= self.textures.len() => {
+                let textures = self.textures.len();
+                fail(ErrorKind::UnknownTexture { mesh: number, texture: texture as usize, textures })
+            }
+            Weight::Texture(_) if mesh.uvs.len() != vertices => {
+                fail(ErrorKind::TextureCoordinateCount { mesh: number, found: mesh.uvs.len(), vertices })
+            }
+            Weight::Texture(_) => {
+                mesh.uvs.iter().enumerate().try_for_each(|(vertex, uv)| blas::check_uv(number, vertex, *uv))
+            }
+        }
+    }
+
+    fn add_triangle(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<(), Error> {
+        let root = self.root(mesh, indices)?;
+        let two_sided = if mesh.sides == Sides::Two { LightTriangle::TWO_SIDED } else { 0 };
+        let portal = if mesh.kind == MeshKind::Portal { LightTriangle::PORTAL } else { 0 };
+        let triangle = LightTriangle {
+            vertices: indices.map(|index| mesh.positions[index as usize].to_array()),
+            root,
+            index_and_flags: self.indices.len() as u32 | two_sided | portal,
+        };
+        if root.average == 0.0 {
+            self.indices.push(NO_LEAF);
+        } else if triangle.triangle().normal_and_area().is_none() {
+            self.indices.push(NO_AREA);
+        } else {
+            self.indices.push(self.triangles.len() as u32);
+            self.triangles.push(triangle);
+        }
+        Ok(())
+    }
+
+    /// The function that guides the mesh, if it is guided by one.
+    fn function(&mut self, mesh: &Mesh<'_>) -> Option<&mut RegisteredFunction<'a>> {
+        let Weight::Texture(TextureId(texture)) = mesh.weight else { return None };
+        match &mut self.textures[texture as usize] {
+            WeightTexture::Function(function) => Some(function),
+            WeightTexture::Image(_) => None,
+        }
+    }
+
+    /// Returns the tree over the texture of one triangle, built only if no triangle before has the same.
+    fn root(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<Root, Error> {
+        let texture = match mesh.weight {
+            Weight::Constant(weight) => return Ok(Root::constant(blas::storable(f64::from(weight)))),
+            Weight::Texture(TextureId(texture)) => texture,
+        };
+        let uvs = indices.map(|index| mesh.uvs[index as usize]);
+        let [a, b, c] = uvs.map(|uv| uv.to_array().map(f32::to_bits));
+        let key = (texture, [a[0], a[1], b[0], b[1], c[0], c[1]]);
+        if let Some(&root) = self.shared.get(&key) {
+            return Ok(root);
+        }
+        let mesh = self.meshes.len() - 1;
+        let root = match &mut self.textures[texture as usize] {
+            WeightTexture::Image(image) => blas::build(image, uvs, &mut self.cells),
+            WeightTexture::Function(function) => blas::build_procedural(function, mesh, uvs, &mut self.cells),
+        }?;
+        self.shared.insert(key, root);
+        Ok(root)
+    }
+}

@@ -1,0 +1,72 @@
+//! Lights that move or change their brightness.
+
+use glam::Vec3;
+
+use super::mesh::{MeshUpdate, check_triangles};
+use super::{Lights, NO_AREA};
+use crate::blas;
+use crate::error::{Error, ErrorKind};
+use crate::geometry::Triangle;
+
+impl Lights {
+    /// Applies updates, or none of them if one is invalid.
+    pub(crate) fn update(&mut self, updates: &[MeshUpdate<'_>]) -> Result<(), Error> {
+        updates.iter().try_for_each(|update| self.check(update))?;
+        updates.iter().for_each(|update| self.apply(update));
+        Ok(())
+    }
+
+    /// Where the triangles of a mesh are in `leaf_of`.
+    fn range(&self, mesh: usize) -> core::ops::Range<usize> {
+        self.meshes[mesh] as usize..self.meshes[mesh + 1] as usize
+    }
+
+    fn check(&self, update: &MeshUpdate<'_>) -> Result<(), Error> {
+        let (mesh, meshes) = (update.mesh.0 as usize, self.meshes.len() - 1);
+        if mesh >= meshes {
+            return Err(Error(ErrorKind::UnknownMesh { mesh, meshes }));
+        }
+        let leaves = &self.leaf_of[self.range(mesh)];
+        if let Some((positions, indices)) = update.triangles {
+            if indices.len() != leaves.len() {
+                return Err(Error(ErrorKind::TriangleCount { mesh, found: indices.len(), expected: leaves.len() }));
+            }
+            check_triangles(mesh, positions, indices)?;
+            let revived = |&(&leaf, indices): &(&u32, &[u32; 3])| {
+                leaf == NO_AREA && triangle(positions, *indices).normal_and_area().is_some()
+            };
+            if let Some(triangle) = leaves.iter().zip(indices).position(|pair| revived(&pair)) {
+                return Err(Error(ErrorKind::Revived { mesh, triangle }));
+            }
+        }
+        let Some(scale) = update.scale else { return Ok(()) };
+        let average = |leaf: &u32| self.triangles.get(*leaf as usize).map_or(0.0, |light| light.root.average);
+        let brightest = leaves.iter().map(average).fold(1.0, f32::max);
+        match [scale, scale * brightest].into_iter().find(|value| !(0.0..=blas::MAX_AVERAGE).contains(value)) {
+            Some(value) => Err(Error(ErrorKind::Weight { mesh, value, limit: blas::MAX_AVERAGE })),
+            None => Ok(()),
+        }
+    }
+
+    fn apply(&mut self, update: &MeshUpdate<'_>) {
+        let mesh = update.mesh.0 as usize;
+        let range = self.range(mesh);
+        if let Some((positions, indices)) = update.triangles {
+            for (&leaf, &indices) in self.leaf_of[range].iter().zip(indices) {
+                if let Some(light) = self.triangles.get_mut(leaf as usize) {
+                    light.vertices = triangle(positions, indices).0.map(Vec3::into);
+                }
+            }
+        }
+        if let Some(scale) = update.scale {
+            if self.scales.is_empty() {
+                self.scales.resize(self.meshes.len() - 1, 1.0);
+            }
+            self.scales[mesh] = scale;
+        }
+    }
+}
+
+fn triangle(positions: &[Vec3], indices: [u32; 3]) -> Triangle {
+    Triangle(indices.map(|index| positions[index as usize]))
+}

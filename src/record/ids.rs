@@ -1,0 +1,56 @@
+//! Numbers of what a host has passed to the builder.
+
+/// A mesh that was added to a builder. Meshes are numbered from 0 in the order in which they are added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MeshId(pub(crate) u32);
+
+impl MeshId {
+    /// Returns the id of the mesh with this number.
+    #[must_use]
+    pub const fn from_index(index: u32) -> Self {
+        Self(index)
+    }
+
+    /// Returns the number of the mesh.
+    #[must_use]
+    pub const fn index(self) -> u32 {
+        self.0
+    }
+}
+
+/// A texture, or a function that takes the place of one, that was added to a builder. Both are numbered together from 0 in
+/// the order in which they are added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TextureId(pub(crate) u32);
+
+impl TextureId {
+    /// Returns the id of the texture with this number.
+    #[must_use]
+    pub const fn from_index(index: u32) -> Self {
+        Self(index)
+    }
+
+    /// Returns the number of the texture.
+    #[must_use]
+    pub const fn index(self) -> u32 {
+        self.0
+    }
+}
+
+/// One triangle of one mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub struct TriangleId {
+    /// Mesh that the triangle belongs to.
+    pub mesh: MeshId,
+    /// Number of the triangle in its mesh.
+    pub triangle: u32,
+}
+
+impl TriangleId {
+    /// Returns the id of a triangle of a mesh.
+    #[must_use]
+    pub const fn new(mesh: MeshId, triangle: u32) -> Self {
+        Self { mesh, triangle }
+    }
+}

@@ -1,0 +1,179 @@
+//! The lights as seen from one shading point: the one door to samples and densities.
+
+use glam::Vec3;
+
+use super::finite::{to_finite, to_positive};
+use crate::light::{LightPoint, LightView, LightViewKind};
+use crate::receiver::ShadingPoint;
+use crate::record::{Hit, LightSample, TriangleId};
+use crate::technique::{Drawn, LightScene, Mixed, Mixture, Variates, Viewpoint};
+use crate::tlas::Splitting;
+use crate::warp::{Variate, seed};
+
+/// The lights as seen from one shading point: made by [`LightSampler::at`](crate::LightSampler::at).
+///
+/// What all questions about one point share is found out once, when it is made; above all which bright features of the
+/// environment are visible through the portals.
+#[derive(Debug)]
+#[must_use]
+pub struct PointSampler<'a> {
+    at: Viewpoint<'a>,
+    mixture: Mixture,
+}
+
+impl<'a> PointSampler<'a> {
+    #[inline(always)]
+    pub(super) fn new(scene: LightScene<'a>, x: &ShadingPoint) -> Self {
+        let at = Viewpoint { scene, x: *x };
+        Self { at, mixture: Mixture::new(&at) }
+    }
+
+    /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the
+    /// point on it, so that stratified pairs stay stratified.
+    ///
+    /// Returns `None` where nothing can arrive from the part of the lights that `u` leads to; such a `u` counts as a sample
+    /// of zero. The densities of all points integrate to the probability of not getting `None`.
+    #[must_use]
+    pub fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
+        let mixed = self.mixture.one();
+        mixed.sample(&self.at, Variates::new(u), |drawn, view| light_sample(&self.at, drawn, view))
+    }
+
+    /// Draws a point on a light that the tree has chosen.
+    #[inline(always)]
+    pub(super) fn sample_on(&self, chosen: (u32, f64), u: [Variate; 2]) -> Option<LightSample> {
+        self.mixture.one().sample_on(&self.at, chosen, u, |drawn, view| light_sample(&self.at, drawn, view))
+    }
+
+    /// Moves the sampler to another shading point from which no bright feature is visible either.
+    pub(super) fn move_to(&mut self, x: &ShadingPoint) {
+        self.at.x = *x;
+    }
+
+    /// Returns the density per solid angle with which [`Self::sample`] draws this point of this triangle. Zero where it
+    /// cannot; never infinite.
+    ///
+    /// Where a ray can cross several portals, what a host needs is [`Self::pdf_direction`].
+    #[must_use]
+    pub fn pdf(&self, hit: &Hit) -> f32 {
+        self.pdf_of_hit(hit, &self.mixture.one())
+    }
+
+    /// Returns the probability with which the trees choose this triangle, in `[0, 1]`.
+    ///
+    /// Samples towards bright features of the environment that are visible through portals are not counted. Without any,
+    /// this is the probability with which [`Self::sample`] chooses the triangle.
+    #[must_use]
+    pub fn pmf(&self, triangle: TriangleId) -> f32 {
+        let leaf = self.at.scene.lights.leaf(triangle);
+        leaf.map_or(0.0, |leaf| self.mixture.one().pmf(&self.at, leaf) as f32)
+    }
+
+    /// Returns the density per solid angle with which [`Self::sample`] goes in a direction: the sum over all points of all
+    /// lights that the ray from the shading point crosses, which the crate finds by its own traversal. `direction` need not
+    /// have unit length.
+    #[must_use]
+    pub fn pdf_direction(&self, direction: Vec3) -> f32 {
+        to_finite(self.direction_density(direction, None, &self.mixture.one()))
+    }
+
+    /// Returns [`Self::pdf_direction`] of a sample's own direction.
+    ///
+    /// The sampled point counts with its own density whatever rounding does to the ray, so the result is never below
+    /// `sample.pdf`. Only what else the ray crosses is followed down the trees, so this is faster as well.
+    #[must_use]
+    pub fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
+        let own = self.at.scene.lights.leaf(sample.hit.triangle);
+        let others = self.direction_density(sample.direction, own, &self.mixture.one());
+        to_finite(f64::from(sample.pdf) + others)
+    }
+
+    /// Draws one point from each part of the light tree that adaptive splitting visits (Conty Estevez and Kulla 2018,
+    /// section 5.4), and one towards a bright feature of the environment if any is visible, and adds them to `samples`.
+    ///
+    /// The estimate is the *sum* of `f / pdf` over the samples: `pdf` and `pdf_area` are expected densities, the expected
+    /// number of samples per measure, and `pmf` is the expected number on that triangle. Nothing is allocated but by
+    /// `samples` itself.
+    pub fn sample_split(&self, u: [f32; 3], splitting: &Splitting, samples: &mut impl Extend<LightSample>) {
+        let salt = seed(&u);
+        // Every number gets a key of its own, which distinguishes the draws and the three dimensions.
+        let variate = |draw: u32, i: usize| {
+            let key = 4 * u64::from(draw) + i as u64;
+            Variate::scrambled(u[i], key, salt ^ key)
+        };
+        let mixed = &self.mixture.side_by_side(splitting);
+        let mut visits = 0;
+        self.at.scene.tlas.sample_split(
+            &self.at.x,
+            &self.at,
+            splitting,
+            |draw| variate(draw, 0),
+            |leaf, count| {
+                let point = [variate(visits, 1), variate(visits, 2)];
+                samples.extend(
+                    mixed.sample_on(&self.at, (leaf, count), point, |drawn, view| light_sample(&self.at, drawn, view)),
+                );
+                visits += 1;
+            },
+        );
+        // A draw that no part of the tree has.
+        let last = u32::MAX >> 2;
+        let numbers = Variates { choice: variate(last, 0), point: [variate(last, 1), variate(last, 2)] };
+        samples.extend(mixed.sample_feature(&self.at, numbers, |drawn, view| light_sample(&self.at, drawn, view)));
+    }
+
+    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a point of a triangle, for
+    /// multiple importance sampling.
+    #[must_use]
+    pub fn pdf_split(&self, hit: &Hit, splitting: &Splitting) -> f32 {
+        self.pdf_of_hit(hit, &self.mixture.side_by_side(splitting))
+    }
+
+    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] in a direction: the sum over
+    /// all points that the ray crosses.
+    #[must_use]
+    pub fn pdf_split_direction(&self, direction: Vec3, splitting: &Splitting) -> f32 {
+        to_finite(self.direction_density(direction, None, &self.mixture.side_by_side(splitting)))
+    }
+
+    fn pdf_of_hit(&self, hit: &Hit, mixed: &Mixed<'_>) -> f32 {
+        let Some(leaf) = self.at.scene.lights.leaf(hit.triangle) else { return 0.0 };
+        let view = &self.at.view(leaf);
+        let Some(view) = view else { return 0.0 };
+        to_finite(mixed.density(&self.at, LightPoint::new(leaf, hit.barycentrics), view))
+    }
+
+    /// Sum of the densities of all points along a ray, except those of one light.
+    fn direction_density(&self, direction: Vec3, except: Option<u32>, mixed: &Mixed<'_>) -> f64 {
+        let mut density = 0.0;
+        self.at.scene.cross(
+            self.at.x.position,
+            direction,
+            |leaf| Some(leaf) != except,
+            |leaf, point| {
+                if let Some(view) = &self.at.view(leaf) {
+                    density += mixed.density(&self.at, LightPoint { leaf, point }, view);
+                }
+            },
+        );
+        density
+    }
+}
+
+/// Everything that a host needs to know of a point that was drawn.
+#[inline(always)]
+fn light_sample(at: &Viewpoint<'_>, drawn: &Drawn, view: &LightView<'_>) -> Option<LightSample> {
+    let relative = view.point(drawn.point.point);
+    let distance = relative.length();
+    let positive = drawn.pdf > 0.0 && distance > 0.0 && distance.is_finite();
+    positive.then(|| LightSample {
+        hit: Hit { triangle: at.scene.lights.id(drawn.point.leaf), barycentrics: drawn.point.point.to_barycentrics() },
+        position: (at.x.position.as_dvec3() + relative).as_vec3(),
+        normal: view.normal(),
+        direction: (relative / distance).as_vec3(),
+        distance: distance as f32,
+        pdf: to_positive(drawn.pdf),
+        pdf_area: to_positive(drawn.pdf * view.solid_angle_per_area(relative)),
+        pmf: to_positive(drawn.pmf),
+    })
+}

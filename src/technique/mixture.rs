@@ -1,0 +1,177 @@
+//! The techniques at one shading point: how often each is used, and the density of all together.
+
+use super::features::VisibleFeatures;
+use super::trees::{self, Trees};
+use super::{Density, Technique, Variates, Viewpoint};
+use crate::light::{LightPoint, LightView};
+use crate::tlas::{FirstWeights, Splitting};
+use crate::warp::{Variate, pick_pair};
+
+/// Least probability of the trees next to the features, where the trees may find anything.
+///
+/// Measured on window and star (docs/ACCURACY.md, "Tuned constants"). A larger value wastes samples where a feature
+/// outshines the rest; a smaller one makes fireflies where the estimate of the rest is too low.
+const LEAST_TREES: f32 = 0.02;
+
+/// The same next to a portal: what is seen through it differs so much from place to place that neither the estimate of
+/// the trees nor their choices are as good there.
+///
+/// Measured on star (docs/ACCURACY.md, "Where it is still weak"): without it one point 6 mm from the card has 21 times the
+/// variance; everywhere, a tenth costs the window with sun 20 times its variance.
+const LEAST_TREES_CLOSE: f32 = 0.2;
+
+/// Largest estimate of an irradiance, so that sums of two stay finite. Proved: twice this is below `f32::MAX`.
+const MAX_IRRADIANCE: f32 = 1e35;
+
+/// The techniques at one shading point, as far as they have been found out once for all questions.
+#[derive(Debug)]
+pub(crate) struct Mixture {
+    /// Weights of the tree's first choice, where balancing the techniques has taken them.
+    first: Option<FirstWeights>,
+    /// The features that are visible. `None` where there is none: a list would take longer to write than many a sample to
+    /// draw.
+    features: Option<VisibleFeatures>,
+    /// Estimate of the irradiance that the trees account for.
+    rest: f32,
+    shares: Shares,
+}
+
+/// What each unit of a technique's [`total`](Technique::total) counts.
+#[derive(Clone, Copy, Debug)]
+struct Shares {
+    /// Probability of the trees.
+    trees: f64,
+    /// Probability of the features over the irradiance from them; 0 if none is visible.
+    features: f64,
+}
+
+/// A point on a light with its density by all techniques together.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drawn {
+    pub(crate) point: LightPoint,
+    /// Probability of the light by the trees, or the expected number of visits where the tree is split.
+    pub(crate) pmf: f64,
+    /// Per solid angle.
+    pub(crate) pdf: f64,
+}
+
+impl Mixture {
+    /// Finds out what each technique accounts for at a shading point.
+    #[inline(always)]
+    pub(crate) fn new(at: &Viewpoint<'_>) -> Self {
+        let mut mixture = Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } };
+        if at.scene.has_features() {
+            mixture.balance(at);
+        }
+        mixture
+    }
+
+    /// Looks for features, and balances them with the trees.
+    #[inline(never)]
+    fn balance(&mut self, at: &Viewpoint<'_>) {
+        let features = self.features.insert(VisibleFeatures::default());
+        features.find(at);
+        let seen = features.irradiance();
+        if !(seen > 0.0 && seen < MAX_IRRADIANCE) {
+            self.features = None;
+            return;
+        }
+        let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
+        self.first = at.scene.tlas.first_weights(&at.x, at);
+        let rest = trees::irradiance(at, self.first.as_ref());
+        self.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
+        let total = f64::from(seen) + f64::from(self.rest);
+        self.shares = Shares { trees: f64::from(self.rest) / total, features: 1.0 / total };
+    }
+
+    /// Returns the mixture for single samples: one technique is chosen.
+    #[inline(always)]
+    pub(crate) fn one(&self) -> Mixed<'_> {
+        Mixed { trees: Trees { first: self.first.as_ref(), splitting: None }, mixture: self, shares: self.shares }
+    }
+
+    /// Returns the mixture for a split tree: the trees in any case, and one feature next to them.
+    pub(crate) fn side_by_side<'m>(&'m self, splitting: &'m Splitting) -> Mixed<'m> {
+        let features = self.features.as_ref().map_or(0.0, |features| 1.0 / features.total());
+        let trees = Trees { first: self.first.as_ref(), splitting: Some(splitting) };
+        Mixed { trees, mixture: self, shares: Shares { trees: 1.0, features } }
+    }
+}
+
+/// The techniques with the share of each.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mixed<'m> {
+    trees: Trees<'m>,
+    mixture: &'m Mixture,
+    shares: Shares,
+}
+
+impl Mixed<'_> {
+    /// Draws a point on a light by one of the techniques.
+    #[inline(always)]
+    pub(crate) fn sample<R>(
+        &self,
+        at: &Viewpoint<'_>,
+        mut u: Variates,
+        then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
+    ) -> Option<R> {
+        if let Some(features) = &self.mixture.features {
+            if pick_pair([features.total() as f32, self.mixture.rest], &mut u.choice) == 0 {
+                return self.sample_feature(at, u, then);
+            }
+        }
+        self.trees.sample(at, u, |point, trees, view| then(&self.complete(at, point, trees, view), view))
+    }
+
+    /// Draws a point on a light that the trees have chosen with this probability, or visit this many times.
+    #[inline(always)]
+    pub(crate) fn sample_on<R>(
+        &self,
+        at: &Viewpoint<'_>,
+        (leaf, pmf): (u32, f64),
+        u: [Variate; 2],
+        then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
+    ) -> Option<R> {
+        self.trees.sample_on(at, leaf, pmf, u, |point, trees, view| then(&self.complete(at, point, trees, view), view))
+    }
+
+    /// Draws a point on a portal towards a feature, if any is visible.
+    #[inline(never)]
+    pub(crate) fn sample_feature<R>(
+        &self,
+        at: &Viewpoint<'_>,
+        u: Variates,
+        then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
+    ) -> Option<R> {
+        let features = self.mixture.features.as_ref()?;
+        features.sample(at, u, |point, features, view| {
+            let trees = self.trees.density(at, point, view);
+            then(&self.mix(point, trees, features), view)
+        })
+    }
+
+    /// Returns a given point with its density.
+    pub(crate) fn density(&self, at: &Viewpoint<'_>, point: LightPoint, view: &LightView<'_>) -> f64 {
+        self.complete(at, point, self.trees.density(at, point, view), view).pdf
+    }
+
+    /// Returns the probability of a light by the trees, or the expected number of visits.
+    pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: u32) -> f64 {
+        self.shares.trees * self.trees.pmf(at, leaf)
+    }
+
+    /// Adds the density by the features to that by the trees.
+    #[inline(always)]
+    fn complete(&self, at: &Viewpoint<'_>, point: LightPoint, trees: Density, view: &LightView<'_>) -> Drawn {
+        match &self.mixture.features {
+            None => self.mix(point, trees, Density { pmf: 0.0, pdf: 0.0 }),
+            Some(features) => self.mix(point, trees, features.density(at, point, view)),
+        }
+    }
+
+    #[inline(always)]
+    fn mix(&self, point: LightPoint, trees: Density, features: Density) -> Drawn {
+        let pdf = self.shares.trees * trees.pdf + self.shares.features * features.pdf;
+        Drawn { point, pmf: trees.pmf * self.shares.trees, pdf }
+    }
+}

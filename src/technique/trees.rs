@@ -1,0 +1,79 @@
+//! The tree over the lights, then the tree over the texture of the one that was chosen.
+
+use super::{Density, Technique, Variates, Viewpoint};
+use crate::light::{LightPoint, LightView, LightViewKind};
+use crate::tlas::{FirstWeights, Splitting};
+use crate::warp::Variate;
+
+/// Both trees, as they are walked at one shading point.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Trees<'t> {
+    /// Weights of the first choice, where they are known already.
+    pub(crate) first: Option<&'t FirstWeights>,
+    /// How far the tree over the lights is split, if it is.
+    pub(crate) splitting: Option<&'t Splitting>,
+}
+
+impl Trees<'_> {
+    /// Returns the probability of a light, or the expected number of visits if the tree is split.
+    pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: u32) -> f64 {
+        match self.splitting {
+            None => at.scene.tlas.pmf(leaf, &at.x, at, self.first),
+            Some(splitting) => at.scene.tlas.expected_count(leaf, &at.x, at, splitting),
+        }
+    }
+
+    /// Draws a point on a light that has been chosen with this probability, or is visited this many times.
+    #[inline(always)]
+    pub(crate) fn sample_on<R>(
+        &self,
+        at: &Viewpoint<'_>,
+        leaf: u32,
+        pmf: f64,
+        u: [Variate; 2],
+        then: impl FnOnce(LightPoint, Density, &LightView<'_>) -> Option<R>,
+    ) -> Option<R> {
+        // By reference: what `?` moves is copied.
+        let view = &at.view(leaf);
+        let view = view.as_ref()?;
+        let (point, pdf) = view.sample(u)?;
+        then(LightPoint { leaf, point }, Density { pmf, pdf: pmf * pdf }, view)
+    }
+}
+
+impl Technique for Trees<'_> {
+    fn total(&self) -> f64 {
+        1.0
+    }
+
+    #[inline(always)]
+    fn sample<R>(
+        &self,
+        at: &Viewpoint<'_>,
+        u: Variates,
+        then: impl FnOnce(LightPoint, Density, &LightView<'_>) -> Option<R>,
+    ) -> Option<R> {
+        let (leaf, pmf) = at.scene.tlas.sample(&at.x, at, self.first, u.choice)?;
+        self.sample_on(at, leaf, pmf, u.point, then)
+    }
+
+    fn density(&self, at: &Viewpoint<'_>, LightPoint { leaf, point }: LightPoint, view: &LightView<'_>) -> Density {
+        match self.pmf(at, leaf) {
+            0.0 => Density { pmf: 0.0, pdf: 0.0 },
+            pmf => Density { pmf, pdf: pmf * view.pdf(point).unwrap_or(0.0) },
+        }
+    }
+}
+
+/// Estimates the irradiance that the trees account for: without the environment's bright features. `first` are the weights
+/// of the tree's first choice, if the tree has nodes. Zero only where nothing can arrive.
+pub(super) fn irradiance(at: &Viewpoint<'_>, first: Option<&FirstWeights>) -> f32 {
+    if let Some(first) = first {
+        return at.scene.lights.energy * first.sum();
+    }
+    // A tree without nodes has one light, or none.
+    if at.scene.lights.is_empty() {
+        return 0.0;
+    }
+    at.view(0).map_or(0.0, |view| view.irradiance(at.scene.lights.scale(0)))
+}

@@ -1,0 +1,85 @@
+//! Everything that techniques draw from, and the same as seen from one shading point.
+
+use glam::Vec3;
+
+use crate::blas::Lattice;
+use crate::env::EnvironmentView;
+use crate::light::{LightKind, LightView, LightsView};
+use crate::math::{at_least, only_if};
+use crate::receiver::ShadingPoint;
+use crate::tlas::{LeafOracle, TlasView};
+
+/// The lights of a scene with the structures over them, all borrowed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightScene<'a> {
+    /// The tree over the lights.
+    pub(crate) tlas: TlasView<'a>,
+    /// The lights, in the order of the tree's leaves.
+    pub(crate) lights: LightsView<'a>,
+    /// What the portals show.
+    pub(crate) environment: EnvironmentView<'a>,
+}
+
+impl<'a> LightScene<'a> {
+    /// Whether bright features of the environment may be seen through portals.
+    #[inline]
+    pub(crate) fn has_features(&self) -> bool {
+        self.lights.has_portals && !self.environment.bright_features().is_empty()
+    }
+
+    /// The environment, if what portals show depends on the direction.
+    #[inline]
+    pub(crate) fn directional_environment(&self) -> Option<&EnvironmentView<'a>> {
+        (!self.environment.is_constant()).then_some(&self.environment)
+    }
+
+    /// Visits all points of the wanted lights that a ray crosses. `direction` need not be a unit vector.
+    pub(crate) fn cross(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        mut is_wanted: impl FnMut(u32) -> bool,
+        mut visit: impl FnMut(u32, Lattice),
+    ) {
+        self.tlas.cross(origin, direction, |leaf| {
+            let point = if is_wanted(leaf) { self.lights.light(leaf).intersect(origin, direction) } else { None };
+            if let Some(point) = point {
+                visit(leaf, point);
+            }
+        });
+    }
+}
+
+/// The lights as seen from one shading point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Viewpoint<'a> {
+    pub(crate) scene: LightScene<'a>,
+    pub(crate) x: ShadingPoint,
+}
+
+impl Viewpoint<'_> {
+    /// Returns a light as seen from here; `None` if nothing can arrive from it.
+    #[inline]
+    pub(crate) fn view(&self, leaf: u32) -> Option<LightView<'_>> {
+        self.scene.lights.view(leaf, &self.x, self.scene.directional_environment())
+    }
+}
+
+impl LeafOracle for Viewpoint<'_> {
+    #[inline(always)]
+    fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
+        let mean = self.scene.environment.mean_without_features();
+        if mean <= 0.0 {
+            return radiances.fill(0.0);
+        }
+        self.scene.environment.radiances_of_balls(centers, radii, set, radiances);
+        // What is not black stays so, however bright the rest is.
+        let relative = |value: f32| only_if(value > 0.0, at_least(value / mean, f32::MIN_POSITIVE));
+        radiances.iter_mut().for_each(|radiance| *radiance = relative(*radiance));
+    }
+
+    #[inline]
+    fn is_visible(&self, leaf: u32) -> bool {
+        self.scene.lights.energy > 0.0 && self.scene.lights.light(leaf).is_visible(&self.x)
+    }
+}

@@ -1,0 +1,249 @@
+//! From the root to a leaf, and from a leaf back to the root: the same weights decide both.
+
+use super::importance::{LeafOracle, ReceiverLanes};
+use crate::receiver::ShadingPoint;
+use crate::simd::{InstructionSet, Kernel, prefetch};
+use crate::tlas::arity::MAX_LANES;
+use crate::tlas::node::{Child, Node};
+use crate::tlas::tree::WideTree;
+use crate::warp::{Variate, pick_wide, pmf_wide};
+
+/// Walks that take turns: enough to hide what one waits for, few enough to stay in the cache.
+pub(crate) const TURNS: usize = 8;
+
+/// A way down the tree, as far as it has got.
+pub(crate) struct Descent<S> {
+    receiver: ReceiverLanes,
+    oracle: S,
+    u: Variate,
+    node: u32,
+    /// Probability of getting here.
+    pmf: f64,
+    /// Where it ended: in a leaf, or with nothing.
+    end: Option<Option<u32>>,
+}
+
+impl<S: LeafOracle> Descent<S> {
+    /// From the root.
+    #[inline(always)]
+    pub(crate) fn new(x: &ShadingPoint, oracle: S, u: Variate) -> Self {
+        Self { receiver: ReceiverLanes::new(x), oracle, u, node: 0, pmf: 1.0, end: None }
+    }
+
+    /// The leaf that was drawn, with its probability.
+    #[inline(always)]
+    pub(crate) fn leaf(&self) -> Option<(u32, f64)> {
+        self.end.flatten().map(|leaf| (leaf, self.pmf))
+    }
+
+    /// Goes on to a child, unless this is the end.
+    #[inline(always)]
+    fn step<const N: usize>(&mut self, tlas: &WideTree<'_, N>) {
+        let node = &tlas.nodes[self.node as usize];
+        self.choose(node, &node.weights(&self.receiver, &self.oracle));
+    }
+
+    /// Chooses a child by the weights of all.
+    #[inline(always)]
+    fn choose<const N: usize>(&mut self, node: &Node<N>, weights: &[f32; N]) {
+        let Some((lane, share)) = pick_wide(weights, &mut self.u) else {
+            self.end = Some(None);
+            return;
+        };
+        self.pmf *= share;
+        match node.child(lane) {
+            Child::Node(index) => self.node = index,
+            Child::Leaf(leaf) => self.end = Some(Some(leaf)),
+            Child::Empty => self.end = Some(None),
+        }
+    }
+}
+
+/// Weights of the root's children, zero in the lanes that the arity does not have.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FirstWeights([f32; MAX_LANES]);
+
+impl FirstWeights {
+    fn new<const N: usize>(weights: [f32; N]) -> Self {
+        Self(core::array::from_fn(|lane| if lane < N { weights[lane] } else { 0.0 }))
+    }
+
+    #[inline(always)]
+    fn lanes<const N: usize>(&self) -> [f32; N] {
+        core::array::from_fn(|lane| self.0[lane])
+    }
+
+    /// Returns the sum of all weights: an estimate of the irradiance in units of the sum of all energies.
+    #[inline]
+    pub(crate) fn sum(&self) -> f32 {
+        self.0.iter().sum()
+    }
+}
+
+/// One way down to a leaf.
+pub(in crate::tlas) struct SampleWalk<'a, const N: usize, S> {
+    pub(in crate::tlas) tlas: &'a WideTree<'a, N>,
+    pub(in crate::tlas) walk: Descent<S>,
+}
+
+impl<const N: usize, S: LeafOracle> Kernel for SampleWalk<'_, N, S> {
+    type Output = Option<(u32, f64)>;
+
+    #[inline(always)]
+    fn run(mut self) -> Self::Output {
+        while self.walk.end.is_none() {
+            self.walk.step(self.tlas);
+        }
+        self.walk.leaf()
+    }
+}
+
+/// Several ways down, one step each in turn, and each step in two halves: while one way waits for memory or for sums,
+/// the others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
+struct InterleavedWalks<'a, const N: usize, S> {
+    tlas: &'a WideTree<'a, N>,
+    walks: &'a mut [Descent<S>],
+}
+
+impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for walks in self.walks.chunks_mut(TURNS) {
+            let mut weights = [[0.0; N]; TURNS];
+            let mut going = true;
+            while going {
+                for (walk, weights) in walks.iter().zip(&mut weights).filter(|(walk, _)| walk.end.is_none()) {
+                    *weights = self.tlas.nodes[walk.node as usize].weights(&walk.receiver, &walk.oracle);
+                }
+                going = false;
+                for (walk, weights) in walks.iter_mut().zip(&weights).filter(|(walk, _)| walk.end.is_none()) {
+                    walk.choose(&self.tlas.nodes[walk.node as usize], weights);
+                    prefetch(&self.tlas.nodes[walk.node as usize]);
+                    going = true;
+                }
+            }
+        }
+    }
+}
+
+/// The way back from a leaf: the probability that [`SampleWalk`] takes it.
+pub(in crate::tlas) struct PmfWalk<'a, const N: usize, S> {
+    pub(in crate::tlas) tlas: &'a WideTree<'a, N>,
+    pub(in crate::tlas) leaf: u32,
+    pub(in crate::tlas) x: &'a ShadingPoint,
+    pub(in crate::tlas) oracle: &'a S,
+    /// Weights of the root, if they are known.
+    pub(in crate::tlas) first: Option<&'a FirstWeights>,
+}
+
+impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        // The way is short to find, but its nodes are far apart in memory.
+        self.tlas.path(self.leaf).for_each(|(node, _)| prefetch(&self.tlas.nodes[node]));
+        let receiver = ReceiverLanes::new(self.x);
+        let mut pmf = 1.0;
+        // Not a fold, whose closure would be compiled for the baseline.
+        for (node, lane) in self.tlas.path(self.leaf) {
+            pmf *= match self.first {
+                Some(weights) if node == 0 => pmf_wide(&weights.lanes::<N>(), lane),
+                _ => pmf_wide(&self.tlas.nodes[node].weights(&receiver, self.oracle), lane),
+            };
+        }
+        pmf
+    }
+}
+
+/// The weights of one node.
+struct NodeWeights<'a, const N: usize, S> {
+    node: &'a Node<N>,
+    x: &'a ShadingPoint,
+    oracle: &'a S,
+}
+
+impl<const N: usize, S: LeafOracle> Kernel for NodeWeights<'_, N, S> {
+    type Output = [f32; N];
+
+    #[inline(always)]
+    fn run(self) -> [f32; N] {
+        self.node.weights(&ReceiverLanes::new(self.x), self.oracle)
+    }
+}
+
+impl<const N: usize> Node<N> {
+    /// Weight of every child.
+    pub(in crate::tlas) fn weigh(&self, x: &ShadingPoint, oracle: &impl LeafOracle) -> [f32; N] {
+        InstructionSet::best().run(NodeWeights { node: self, x, oracle })
+    }
+}
+
+impl<const N: usize> WideTree<'_, N> {
+    /// Draws a leaf. Returns it with its probability; `None` where nothing can arrive from the part of the tree
+    /// that `u` leads to. `first` are [`Self::first_weights`], if they are known.
+    pub(crate) fn sample(
+        &self,
+        x: &ShadingPoint,
+        oracle: &impl LeafOracle,
+        first: Option<&FirstWeights>,
+        u: Variate,
+    ) -> Option<(u32, f64)> {
+        let Some(root) = self.nodes.first() else { return self.single_leaf(oracle).then_some((0, 1.0)) };
+        let mut walk = Descent::new(x, oracle, u);
+        if let Some(weights) = first {
+            walk.choose(root, &weights.lanes());
+        }
+        InstructionSet::best().run(SampleWalk { tlas: self, walk })
+    }
+
+    /// Draws a leaf below a node.
+    pub(in crate::tlas) fn sample_below(
+        &self,
+        node: usize,
+        x: &ShadingPoint,
+        oracle: &impl LeafOracle,
+        u: Variate,
+    ) -> Option<(u32, f64)> {
+        let walk = Descent { node: node as u32, ..Descent::new(x, oracle, u) };
+        InstructionSet::best().run(SampleWalk { tlas: self, walk })
+    }
+
+    /// As many calls of [`Self::sample`], of which each walk then holds what was drawn.
+    pub(crate) fn sample_many(&self, walks: &mut [Descent<impl LeafOracle>]) {
+        if self.nodes.is_empty() {
+            for walk in walks {
+                walk.end = Some(self.single_leaf(&walk.oracle).then_some(0));
+            }
+            return;
+        }
+        InstructionSet::best().run(InterleavedWalks { tlas: self, walks });
+    }
+
+    /// Probability with which [`Self::sample`] draws a leaf.
+    pub(crate) fn pmf(
+        &self,
+        leaf: u32,
+        x: &ShadingPoint,
+        oracle: &impl LeafOracle,
+        first: Option<&FirstWeights>,
+    ) -> f64 {
+        if self.nodes.is_empty() {
+            return if self.single_leaf(oracle) { 1.0 } else { 0.0 };
+        }
+        InstructionSet::best().run(PmfWalk { tlas: self, leaf, x, oracle, first })
+    }
+
+    /// Weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
+    /// energies; `None` for a tree without nodes.
+    pub(crate) fn first_weights(&self, x: &ShadingPoint, oracle: &impl LeafOracle) -> Option<FirstWeights> {
+        self.nodes.first().map(|root| FirstWeights::new(root.weigh(x, oracle)))
+    }
+
+    /// Whether the tree is a single leaf, and that leaf visible.
+    pub(in crate::tlas) fn single_leaf(&self, oracle: &impl LeafOracle) -> bool {
+        self.leaves.len() == 1 && oracle.is_visible(0)
+    }
+}

@@ -1,0 +1,232 @@
+//! How likely each child of a node is to be chosen from a shading point: what it sends there by its first and second
+//! moments, and exactly zero where its bounds prove that nothing can arrive.
+//!
+//! The moments replace the conservative geometric term of Conty Estevez and Kulla (2018), which is kept as the proof.
+//! A cluster's position and normal are taken for normal variables with its mean and variance; cosines become the
+//! expectation of a clamped normal variable.
+
+use glam::Vec3;
+
+use crate::math::{self, at_least, only_if};
+use crate::receiver::{Receiver, ShadingPoint};
+use crate::tlas::node::{ALL, Child, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
+use crate::warp::{keep_least, within_range};
+
+/// What the tree asks of the level above about its leaves and about what they show.
+pub(crate) trait LeafOracle {
+    /// Writes mean radiances, relative to the mean over all directions, of what portals show in the directions from the
+    /// shading point to balls with these centers (by axis, relative to the shading point) and radii. A radiance is zero
+    /// only where all of it is black. All slices are of one length. Only the elements in `set`, a set of bits, are asked
+    /// for; all are zero before.
+    ///
+    /// Must be `#[inline(always)]`: the length is then a constant, and loops over it become vectors.
+    fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]);
+
+    /// Whether anything at all can travel from a leaf to the shading point. Asked only where the bounds of a leaf leave
+    /// that open.
+    fn is_visible(&self, leaf: u32) -> bool;
+}
+
+impl<O: LeafOracle> LeafOracle for &O {
+    #[inline(always)]
+    fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
+        (**self).radiances(centers, radii, set, radiances);
+    }
+
+    #[inline(always)]
+    fn is_visible(&self, leaf: u32) -> bool {
+        (**self).is_visible(leaf)
+    }
+}
+
+/// Least expected cosine of a cluster that is not culled.
+const LEAST_COSINE: f32 = 1e-3;
+/// Relative error granted to the dot products that decide on culling.
+const ROUNDING: f32 = 1e-5;
+
+/// Cosine at the lights up to which a single triangle may be seen edge-on: covers the rounding of normals.
+const EDGE: f32 = 3e-3;
+/// Least squared distance, so that nothing overflows.
+const LEAST_SQUARED: f32 = 1e-30;
+
+// How much of a variance counts, found by experiment: docs/ACCURACY.md.
+
+/// Of the normals' variance, along the line of sight.
+const NORMAL_SHARE: f32 = 0.4;
+/// Of the positions' variance, for the cosine at the lights.
+const EMITTER_SHARE: f32 = 1.0 / 3.0;
+/// Of the positions' variance, for the cosine at the receiver.
+const RECEIVER_SHARE: f32 = 0.8;
+/// Of the positions' variance, for the squared distance.
+const DISTANCE_SHARE: f32 = 0.3;
+
+/// A shading point, as the loop over lanes wants it.
+pub(super) struct ReceiverLanes {
+    position: Vec3,
+    /// What the cosine at the receiver is taken with; zero in a medium.
+    normal: Vec3,
+    /// Bits of the cosine that count: all but its sign, where both sides receive.
+    cosine_bits: u32,
+    /// Least cosine at the receiver; 1 in a medium, where it replaces the cosine.
+    least_cosine: f32,
+    /// The normal of the horizon, and one for no horizon.
+    horizon: Vec3,
+    lift: f32,
+    /// Rounding granted to heights over the horizon, relative to distances.
+    slack: f32,
+}
+
+impl ReceiverLanes {
+    #[inline(always)]
+    pub(super) fn new(x: &ShadingPoint) -> Self {
+        let position = x.position;
+        let (all, unsigned) = (u32::MAX, u32::MAX >> 1);
+        let (normal, cosine_bits, least_cosine, horizon, lift) = match x.receiver {
+            Receiver::Surface(normal) => (normal, all, LEAST_COSINE, normal, 0.0),
+            Receiver::Transmissive(normal) => (normal, unsigned, LEAST_COSINE, Vec3::ZERO, 1.0),
+            Receiver::Volume => (Vec3::ZERO, all, 1.0, Vec3::ZERO, 1.0),
+        };
+        let slack = ROUNDING * horizon.abs().element_sum();
+        Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack }
+    }
+}
+
+/// Weights of a node's children before the level above was asked anything.
+struct Estimates<const N: usize> {
+    /// Zero where nothing can arrive.
+    weights: [f32; N],
+    /// Bits of the largest weight.
+    largest: u32,
+    /// A set of bits: leaves of which the bounds do not decide whether they are visible.
+    doubtful: u32,
+}
+
+impl<const N: usize> Node<N> {
+    /// Weight of every child. All zero where nothing below the node can be visible.
+    #[inline(always)]
+    pub(super) fn weights(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
+        let Estimates { mut weights, mut largest, doubtful } = self.estimates(x);
+        if doubtful != 0 {
+            largest = self.ask(oracle, &mut weights, doubtful);
+        }
+        if { self.portals } != [0; N] {
+            largest = self.look_through(x, oracle, &mut weights);
+        }
+        keep_least(&mut weights, largest);
+        weights
+    }
+
+    /// Asks the level above about leaves in doubt, and returns the bits of the largest weight.
+    #[inline(never)]
+    fn ask(&self, oracle: &impl LeafOracle, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
+        while doubtful != 0 {
+            let lane = doubtful.trailing_zeros() as usize;
+            doubtful &= doubtful - 1;
+            let Child::Leaf(leaf) = self.child(lane) else { continue };
+            if !oracle.is_visible(leaf) {
+                weights[lane] = 0.0;
+            }
+        }
+        weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()))
+    }
+
+    /// Multiplies what comes through portals by what is seen there, and returns the bits of the largest weight.
+    #[inline(always)]
+    fn look_through(&self, x: &ReceiverLanes, oracle: &impl LeafOracle, weights: &mut [f32; N]) -> u32 {
+        let (portals, centers, halves) = (self.portals, self.centers, self.halves);
+        let origin = Vec3::from_array(self.origin) - x.position;
+        let step = Vec3::from_array(self.steps.map(wide));
+        let (mut balls, mut radii, mut set) = ([[0.0; N]; 3], [0.0; N], 0);
+        for i in 0..N {
+            let half = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
+            let center = Vec3::new(f32::from(centers[0][i]), f32::from(centers[1][i]), f32::from(centers[2][i]));
+            let center = origin + center * step;
+            (balls[0][i], balls[1][i], balls[2][i]) = (center.x, center.y, center.z);
+            radii[i] = 0.5 * math::sqrt((half * step).length_squared());
+            set |= u32::from((weights[i] > 0.0) & (portals[i] > 0)) << i;
+        }
+        let mut radiances = [0.0; N];
+        oracle.radiances([&balls[0], &balls[1], &balls[2]], &radii, set, &mut radiances);
+        let mut largest = 0;
+        for i in 0..N {
+            let share = f32::from(portals[i]) * (1.0 / f32::from(ALL));
+            let factor = 1.0 - share + share * radiances[i];
+            let is_lit = (weights[i] > 0.0) & (factor > 0.0);
+            weights[i] = only_if(is_lit, within_range(weights[i] * factor));
+            largest = largest.max(weights[i].to_bits());
+        }
+        largest
+    }
+
+    /// The geometry of all lanes, in one plain loop over arrays that a compiler can turn into vectors.
+    #[inline(always)]
+    fn estimates(&self, x: &ReceiverLanes) -> Estimates<N> {
+        let (normals, energies, centers, halves) = (self.normals, self.energies, self.centers, self.halves);
+        let (means, deviations, lengths, tangents) = (self.means, self.deviations, self.lengths, self.tangents);
+        // Relative to the shading point before anything else: far from the origin the difference is what is exact.
+        let origin = Vec3::from_array(self.origin) - x.position;
+        let step = Vec3::from_array(self.steps.map(wide));
+        let half_step = 0.5 * step;
+        let mean_step = half_step * (1.0 / MEAN_STEPS);
+        let (horizon, absolute_horizon, normal) = (x.horizon, x.horizon.abs(), x.normal);
+        let mut weights = [0.0; N];
+        let (mut largest, mut doubtful) = (0, 0);
+        for i in 0..N {
+            let counts = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
+            let half = counts * half_step;
+            let center = Vec3::new(f32::from(centers[0][i]), f32::from(centers[1][i]), f32::from(centers[2][i]));
+            let center = origin + center * step;
+
+            // The horizon, by the most and the least favourable corner of the box.
+            let (height, reach) = (horizon.dot(center) + x.lift, absolute_horizon.dot(half));
+            // The emitters' side: the angle between the axis and the direction to any point of the box, by the box's
+            // nearest corner along the axis and the ball around it across.
+            let bits = normals[i];
+            let axis = Vec3::new(Self::steps(bits, 0), Self::steps(bits, 1), Self::steps(bits, 2));
+            let (radius2, distance2) = (half.length_squared(), center.length_squared());
+            let along = axis.dot(center);
+            let radius = math::sqrt(radius2);
+            let code = f32::from(tangents[i]);
+            let tangent = code * code * (1.0 / (TANGENT_STEPS * TANGENT_STEPS));
+            // In steps of the axis. Squared, for want of a root of the distance across.
+            let across2 = at_least(NORMAL_STEPS * NORMAL_STEPS * distance2 - along * along, 0.0);
+            let beyond = along - axis.abs().dot(half) - tangent * NORMAL_STEPS * radius;
+            let away = (beyond > 0.0) & (beyond * beyond > tangent * tangent * across2) & (code < f32::from(WIDE));
+
+            // What arrives, by the moments.
+            let mean = Vec3::new(f32::from(means[0][i]), f32::from(means[1][i]), f32::from(means[2][i]));
+            let to_mean = center + mean * (counts * mean_step);
+            let deviation = f32::from(deviations[i]);
+            let length = f32::from(lengths[i]);
+            let variance = deviation * deviation * (1.0 / (255.0 * 255.0)) * radius2;
+            let squared = at_least(to_mean.length_squared() + DISTANCE_SHARE * variance, LEAST_SQUARED);
+            let (inverse2, distance) = (1.0 / squared, math::sqrt(squared));
+            // No point of the box is farther than this.
+            let slack = x.slack * (distance + 2.0 * radius);
+            let (below, straddles) = (height + reach < -slack, !(height - reach > slack));
+            let energy = wide(energies[i]);
+            let culled = below | away | (energy == 0.0);
+            let side = f32::from_bits(normal.dot(to_mean).to_bits() & x.cosine_bits);
+            let receiver = at_least(clamped_mean(side, RECEIVER_SHARE * variance), x.least_cosine * distance);
+            let facing = length * (-1.0 / (255.0 * NORMAL_STEPS)) * axis.dot(to_mean);
+            let facing = f32::from_bits(facing.to_bits() & !(bits & TWO_SIDED));
+            let loss = NORMAL_SHARE - length * length * (NORMAL_SHARE / (255.0 * 255.0));
+            let spread = loss * squared + EMITTER_SHARE * variance;
+            let emitter = at_least(clamped_mean(facing, spread), LEAST_COSINE * distance);
+            let term = (receiver * inverse2) * emitter * inverse2;
+
+            weights[i] = only_if(!culled, within_range(energy * term));
+            largest = largest.max(weights[i].to_bits());
+            doubtful |= u32::from((straddles | (facing < EDGE * distance)) & !culled) << i;
+        }
+        let leaves = self.children() & (u32::MAX << self.node_count);
+        Estimates { weights, largest, doubtful: doubtful & leaves }
+    }
+}
+
+/// Expectation of `max(0, X)` for a normal variable of this mean and variance, within 4 % of the standard deviation:
+/// exact at a mean of zero and far from it.
+#[inline(always)]
+pub(super) fn clamped_mean(mean: f32, variance: f32) -> f32 {
+    0.5 * (mean + math::sqrt(mean * mean + core::f32::consts::FRAC_2_PI * variance))
+}
