@@ -1,8 +1,8 @@
-//! What sampling returns and what a density is asked for.
+//! What sampling returns, and the point whose density can be queried.
 
 use glam::Vec3;
 
-/// One triangle of one mesh that was handed to the builder.
+/// One triangle of one mesh that was passed to the builder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TriangleId {
     /// Number of the mesh, in the order in which meshes were added.
@@ -23,7 +23,7 @@ pub struct Hit {
 /// A point on a light, drawn for a shading point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
-    /// Where on the lights the point lies.
+    /// Position of the point on the lights.
     pub hit: Hit,
     /// World position of the point.
     pub position: Vec3,

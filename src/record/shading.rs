@@ -1,4 +1,4 @@
-//! The point that light is gathered at.
+//! The point at which light is gathered.
 
 use glam::Vec3;
 

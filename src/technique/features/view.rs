@@ -7,7 +7,7 @@ use crate::light::Lit;
 use crate::warp::Variate;
 
 /// Ratio of a cell's to a feature's angular radius up to which the cell counts as one part, however its texture
-/// varies. *Measured*: see the file's table in the notes on constants.
+/// varies. *Measured* on the window scenes of the bench `quality`.
 ///
 /// Larger: fewer parts, so that a shading point is cheaper, but the texture inside a part is followed by the tree's
 /// descent alone. Smaller: more parts, up to the limit of the list.
