@@ -1,7 +1,7 @@
 //! Radiance of a region of directions: an estimate that is zero only if all of the region is black.
 //!
-//! The radiance is looked up twice. The *talk's* (Ogaki 2020, "MIP Maps for Environment Map"): the nearest texel of a 3x3
-//! filtered level whose filter is as large as the region's solid angle. It is the better estimate, but a texel
+//! The radiance is looked up twice. The *talk's* lookup (Ogaki 2020, "MIP Maps for Environment Map"): the nearest
+//! texel of a 3x3 filtered level whose filter is as large as the region's solid angle. It is the better estimate, but a texel
 //! of it may miss what lies in the region. The *bounds*: at most 2x2 texels of a level that are sure to hold the
 //! whole region. They decide about black and constant, and their mean is a small share of the estimate so that
 //! nothing bright is lost.

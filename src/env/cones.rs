@@ -57,7 +57,8 @@ impl EnvironmentView<'_> {
         self.ranges[0][0] == 0.0
     }
 
-    /// Filtered mean of a texel of the pyramid, and a share of the mean over all directions for what the texel may miss.
+    /// Filtered mean of a texel of the pyramid, and a share of the mean over all directions for what the texel may
+    /// miss.
     #[inline]
     fn filtered_and_defensive(&self, texel: u32) -> f32 {
         (1.0 - DEFENSIVE_SHARE) * self.filtered[texel as usize] + DEFENSIVE_SHARE * self.mean_without_features()

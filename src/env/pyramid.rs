@@ -20,7 +20,7 @@ pub(super) struct Pyramid {
     pub(super) means: Vec<f32>,
     /// Minimum and maximum of all levels but the finest, whose texels are their own.
     pub(super) ranges: Vec<[f32; 2]>,
-    /// Box-filtered means of all levels: each the average over its 3x3 neighbourhood across the map's seams.
+    /// Box-filtered means of all levels: each the average over its 3x3 neighborhood across the map's seams.
     pub(super) filtered: Vec<f32>,
 }
 

@@ -8,8 +8,8 @@ use crate::parallel::for_each_chunk;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Returns the means of the source over the texels of an equal-area image of `2^depth` texels a side, `depth` at least 1, as
-/// the finest level of an otherwise empty pyramid.
+/// Returns the means of the source over the texels of an equal-area image of `2^depth` texels a side, `depth` at
+/// least 1, as the finest level of an otherwise empty pyramid.
 ///
 /// A texel that shares any area with a lit cell is lit.
 pub(super) fn resample(source: &EnvironmentSource, depth: u32) -> Vec<f32> {

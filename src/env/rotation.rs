@@ -8,8 +8,8 @@ use glam::{DMat3, Mat3, Vec3};
 /// Larger: skewed matrices pass as rotations. Smaller: products of many rotations are refused.
 const ROTATION_TOLERANCE: f64 = 1e-4;
 
-/// Largest deviation from orthonormal that rounding to `f32` leaves. *Proved*: each dot product of two columns is off by
-/// at most 4 half units in the last place, 2.4e-7, rounded up.
+/// Largest deviation from orthonormal that rounding to `f32` leaves. *Proved*: each dot product of two columns is
+/// off by at most 4 half units in the last place, 2.4e-7, rounded up.
 ///
 /// Larger: less exact rotations are left as they are. Smaller: a rotation could change when it is set again.
 const ROTATION_EXACT: f64 = 5e-7;

@@ -100,9 +100,9 @@ impl EnvironmentSource {
             return f64::from(self.texels[row * self.width + column]);
         }
         let (x, y) = ((column / 2) as i32, (row / 2) as i32);
-        // Towards the neighbour that the quadrant lies next to.
+        // Towards the neighbor that the quadrant lies next to.
         let (dx, dy) = ((column % 2) as i32 * 2 - 1, (row % 2) as i32 * 2 - 1);
-        // Over half a texel the weight of the nearer centre is 3/4 on average.
+        // Over half a texel the weight of the nearer center is 3/4 on average.
         (9.0 * self.texel(x, y) + 3.0 * (self.texel(x + dx, y) + self.texel(x, y + dy)) + self.texel(x + dx, y + dy))
             * (1.0 / 16.0)
     }

@@ -1,4 +1,4 @@
-//! The borrowed form of an environment, which holds all look-ups.
+//! The borrowed form of an environment: all lookups.
 
 use super::feature_texel::FeatureTexel;
 use super::features::BrightFeature;

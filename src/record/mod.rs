@@ -1,4 +1,4 @@
-//! The plain records that a host hands in and gets back.
+//! The plain records that a host passes in and gets back.
 
 mod ids;
 mod image;

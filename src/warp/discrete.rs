@@ -3,13 +3,13 @@
 use crate::math::{at_least, at_most, only_if};
 use crate::warp::variate::Variate;
 
-/// Sum of the weights, in the precision that [`pick`] wants.
+/// Returns the sum of the weights, in the precision that [`pick`] needs.
 #[inline]
 pub(crate) fn sum(weights: &[f32]) -> f64 {
     weights.iter().fold(0.0, |sum, &w| sum + f64::from(w))
 }
 
-/// Probability of an index among all: `weights[i] / total`, zero if its weight is.
+/// Returns the probability of an index among all: `weights[i] / total`, or zero if its weight is zero.
 #[inline]
 pub(crate) fn pmf(weights: &[f32], i: usize) -> f64 {
     match weights[i] {
@@ -18,14 +18,22 @@ pub(crate) fn pmf(weights: &[f32], i: usize) -> f64 {
     }
 }
 
-/// Share of the largest weight that every possible choice keeps, so that its probability cannot vanish.
-const LEAST_SHARE: f32 = 1e-12;
+/// Share of the largest weight that every possible choice keeps. *Proved*: the product of twenty such shares is a
+/// positive `f64`, so no probability of a walk vanishes.
+///
+/// Larger: more samples go where next to nothing is expected. Smaller: a wrong estimate causes a brighter firefly, and
+/// products of shares could underflow.
+const LEAST_CHOICE_SHARE: f32 = 1e-12;
 
-/// Bounds of a weight, so that sums and quotients of weights stay finite.
+/// Least and largest weight. *Proved*: a sum of 16 weights is a finite `f32`, and a quotient of two
+/// sums is a normal `f64`.
+///
+/// Wider: sums could overflow. Narrower: weights of very bright or very dark scenes become
+/// equal.
 const WEIGHT_RANGE: (f32, f32) = (1e-30, 1e30);
 
-/// Makes every choice that is possible really so, whatever overflow or underflow has made of its weight, and
-/// every other weight zero.
+/// Makes the weight of every possible choice positive, whatever overflow or underflow has made of it, and every other
+/// weight zero.
 #[inline(always)]
 pub(crate) fn keep_possible<const N: usize>(weights: &mut [f32; N], possible: impl Fn(usize) -> bool) {
     let mut largest = 0;
@@ -36,29 +44,30 @@ pub(crate) fn keep_possible<const N: usize>(weights: &mut [f32; N], possible: im
     keep_least(weights, largest);
 }
 
-/// A weight that sums and quotients bear; also for the NaN of 0 · ∞.
+/// Returns the nearest weight for which sums and quotients are finite; also for the NaN of 0 · ∞.
 #[inline(always)]
 pub(crate) fn within_range(weight: f32) -> f32 {
     at_most(at_least(weight, WEIGHT_RANGE.0), WEIGHT_RANGE.1)
 }
 
-/// Gives every positive weight its least share. `largest` are the bits of the largest weight, which of positive
-/// numbers are ordered as the numbers are: integers can be compared in any order, so that loops become vectors.
+/// Raises every positive weight to its least share. `largest` holds the bits of the largest weight: bits of positive
+/// numbers are ordered as the numbers are, and the maximum of integers can be taken in any order, so that loops become
+/// vectors.
 #[inline(always)]
 pub(crate) fn keep_least<const N: usize>(weights: &mut [f32; N], largest: u32) {
-    let least = LEAST_SHARE * f32::from_bits(largest);
+    let least = LEAST_CHOICE_SHARE * f32::from_bits(largest);
     for weight in weights {
         *weight = only_if(*weight > 0.0, at_least(*weight, least));
     }
 }
 
-/// The sums of all weights up to each, in the precision that a choice wants. They never fall, and a weight of zero adds
-/// nothing.
+/// Returns the sum of the weights up to each, in the precision that a choice needs. Sums never decrease, and a
+/// weight of zero adds nothing.
 #[inline(always)]
 fn ends<const N: usize>(weights: &[f32; N]) -> [f64; N] {
     let mut ends = [0.0; N];
     let mut end = 0.0;
-    // By pairs, which halves the chain of sums that wait for each other.
+    // By pairs, which halves the chain of dependent sums.
     for i in (0..N).step_by(2) {
         let (first, second) = (f64::from(weights[i]), f64::from(weights[i + 1]));
         ends[i] = end + first;
@@ -91,7 +100,7 @@ pub(crate) fn pick(weights: &[f32], total: f64, variate: &mut Variate) -> usize 
     chosen
 }
 
-/// Probability with which [`pick_wide`] picks an index.
+/// Returns the probability with which [`pick_wide`] picks an index.
 #[inline(always)]
 pub(crate) fn pmf_wide<const N: usize>(weights: &[f32; N], i: usize) -> f64 {
     match weights[i] {
@@ -111,7 +120,7 @@ pub(crate) fn pick_wide<const N: usize>(weights: &[f32; N], variate: &mut Variat
     }
     let target = variate.value() * total;
     // A value below one leaves the target below the total, so that a weight is found, and never one of zero. Counted:
-    // a search by halves would wait for each of its steps.
+    // the steps of a binary search would depend on each other.
     let chosen = ends[..N - 1].iter().map(|&end| u32::from(target >= end)).sum::<u32>() as usize;
     // The end before, or zero: products with 0 and 1 are exact.
     let low = ends[chosen.saturating_sub(1)] * f64::from(u8::from(chosen > 0));

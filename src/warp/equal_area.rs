@@ -1,7 +1,7 @@
 //! The equal-area octahedral map between the unit square and the unit sphere.
 //!
 //! Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", Journal of Graphics Tools 13(3), 2008, in
-//! the orientation of pbrt-v4: the centre of the square is `+z`, its corners are `-z`, the inscribed diamond is
+//! the orientation of pbrt-v4: the center of the square is `+z`, its corners are `-z`, the inscribed diamond is
 //! the upper hemisphere, and the square's axes run along `x` and `y`. Equal areas of the square `[0, 1]²` are
 //! equal solid angles, 4π for all of it.
 //!
@@ -12,13 +12,13 @@ use crate::math::{limit, sqrt};
 use core::f32::consts::{FRAC_1_SQRT_2, TAU};
 use glam::{Vec2, Vec3};
 
-/// Unit direction of a point of the unit square. The point is clamped to the square.
+/// Returns the unit direction of a point of the unit square. The point is clamped to the square.
 ///
 /// Within 2.5e-7 of the exact map, and within 2.5e-7 of unit length.
 #[inline]
 pub(crate) fn square_to_sphere(point: Vec2) -> Vec3 {
     let (x, y) = (limit(point.x, 1.0), limit(point.y, 1.0));
-    // Distances from the centre lines and from the nearest edges, in units of half the side. None of them
+    // Distances from the center lines and from the nearest edges, in units of half the side. None of them
     // cancels: 2x - 1 rounds at most once, 1 - x is exact where x > 1/2.
     let (u, v) = ((2.0 * x - 1.0).abs(), (2.0 * y - 1.0).abs());
     let (to_edge_u, to_edge_v) = (2.0 * x.min(1.0 - x), 2.0 * y.min(1.0 - y));
@@ -40,9 +40,9 @@ pub(crate) fn square_to_sphere(point: Vec2) -> Vec3 {
     Vec3::new((radius * cos_phi).copysign(x - 0.5), (radius * sin_phi).copysign(y - 0.5), z.copysign(height))
 }
 
-/// Point of the unit square that a unit direction maps to, within 2.5e-7 of the exact map.
+/// Returns the point of the unit square that a unit direction maps to, within 2.5e-7 of the exact map.
 ///
-/// Any vector gives a point of the square; only for unit vectors it is the right one.
+/// Any vector gives a point of the square; it is meaningful only for unit vectors.
 #[inline(always)]
 pub(crate) fn sphere_to_square(direction: Vec3) -> Vec2 {
     let (x, y, z) = (direction.x.abs(), direction.y.abs(), direction.z.abs());
@@ -51,7 +51,7 @@ pub(crate) fn sphere_to_square(direction: Vec3) -> Vec2 {
     let minor = quarter_of_eighth(x.min(y), x.max(y)) * r;
     let major = r - minor;
     let (a, b) = if y > x { (minor, major) } else { (major, minor) };
-    // Distances from the centre lines; the lower hemisphere is mirrored at the diamond.
+    // Distances from the center lines; the lower hemisphere is mirrored at the diamond.
     let (u, v) = if direction.z < 0.0 { (1.0 - b, 1.0 - a) } else { (a, b) };
     let place = |distance: f32, side: f32| limit(0.5 + 0.5 * distance.copysign(side), 1.0);
     Vec2::new(place(u, direction.x), place(v, direction.y))
@@ -81,17 +81,19 @@ fn quarter_of_eighth(minor: f32, major: f32) -> f32 {
     if steep { 0.5 - angle } else { angle }
 }
 
-/// Bound on how far one coordinate of the unit square moves per radian on the sphere.
+/// Bound on how far one coordinate of the unit square moves per radian on the sphere. *Proved*:
 ///
 /// With r = √2 sin(θ/2) and f = 2φ/π, a coordinate in `[-1, 1]` is `r f` or `r (1 - f)` up to sign and mirror
 /// image; its gradient is at most √(r'² + (r f')²) = √(c²/2 + 2/(π c)²) with c = cos(θ/2) in `[√½, 1]`, which is
 /// largest at the pole: 0.8383, half of it for the unit square. Rounded up.
+///
+/// Larger: coarser bounds of a region's radiance. Smaller: a lit texel could be missed.
 pub(crate) const STRETCH: f32 = 0.43;
 
-/// Solid angle of the whole square.
+/// Solid angle of the whole square, 4π steradians. *Proved*: the area of the unit sphere.
 pub(crate) const SPHERE: f32 = 2.0 * TAU;
 
-/// The texel of an `n` x `n` equal-area image that stands at any place of the plane around it.
+/// Returns the texel of an `n` x `n` equal-area image that lies at a place of the tiled plane.
 ///
 /// Beyond an edge the image continues as its copy, rotated by half a turn about the edge's midpoint, so copies
 /// whose tile coordinates add up to an odd number are rotated. A path on the sphere that crosses an edge of the

@@ -64,7 +64,7 @@ fn compare(sky: &Environment) -> u32 {
         }
     }
     assert!(lit > 1000, "{lit}");
-    // Rounding takes some to the neighbour.
+    // Rounding takes some to the neighbor.
     assert!(f64::from(close) > 0.99 * f64::from(lit), "{close} of {lit}");
     black
 }

@@ -23,7 +23,7 @@ fn reference_to_square(d: DVec3) -> DVec2 {
     DVec2::new(0.5 + 0.5 * u.copysign(d.x), 0.5 + 0.5 * v.copysign(d.y))
 }
 
-/// Dense and random points of the square: grid points hit seams, axes and poles, the rest hits neighbourhoods.
+/// Dense and random points of the square: grid points hit seams, axes and poles, the rest hits neighborhoods.
 fn points() -> impl Iterator<Item = Vec2> {
     let grid = (0..=512).flat_map(|j| (0..=512).map(move |i| Vec2::new(i as f32, j as f32) / 512.0));
     let mut pcg = Pcg32::new(3, 3);
@@ -128,15 +128,15 @@ fn any_vector_gives_a_point_of_the_square() {
 }
 
 #[test]
-fn wrapped_neighbours_are_neighbours_on_the_sphere() {
+fn wrapped_neighbors_are_neighbors_on_the_sphere() {
     for n in [1, 2, 5, 16, 64] {
-        let centre = |(x, y): (u32, u32)| square_to_sphere((Vec2::new(x as f32, y as f32) + 0.5) / n as f32);
+        let center = |(x, y): (u32, u32)| square_to_sphere((Vec2::new(x as f32, y as f32) + 0.5) / n as f32);
         for y in -3 * n..4 * n {
             for x in -3 * n..4 * n {
-                let here = centre(wrap_texel(x, y, n));
+                let here = center(wrap_texel(x, y, n));
                 for (dx, dy) in [(1, 0), (0, 1)] {
-                    let next = centre(wrap_texel(x + dx, y + dy, n));
-                    // Two centres are a texel's side apart in the plane; a unit of the square is up to 6.2 radians
+                    let next = center(wrap_texel(x + dx, y + dy, n));
+                    // Two centers are a texel's side apart in the plane; a unit of the square is up to 6.2 radians
                     // (at the equator, on the axes).
                     let limit = 6.3 / n as f32;
                     assert!(here.angle_between(next) < limit, "{n}: ({x}, {y}) + ({dx}, {dy})");
