@@ -10,34 +10,22 @@ use fanlight::{
     Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight, sphere_to_square, square_to_sphere,
 };
 use glam::{DVec3, Vec2, Vec3};
+use rand_pcg::rand_core::Rng;
 
 /// Shading points, and vectors of random numbers, that are gone through in a circle.
 const POINTS: usize = 1 << 16;
 
 /// PCG32 (O'Neill 2014), XSH-RR 64/32.
-struct Pcg {
-    state: u64,
-    increment: u64,
-}
+struct Pcg(rand_pcg::Pcg32);
 
 impl Pcg {
     fn new(seed: u64, sequence: u64) -> Self {
-        let mut pcg = Self { state: 0, increment: (sequence << 1) | 1 };
-        pcg.next_u32();
-        pcg.state = pcg.state.wrapping_add(seed);
-        pcg.next_u32();
-        pcg
-    }
-
-    fn next_u32(&mut self) -> u32 {
-        let old = self.state;
-        self.state = old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(self.increment);
-        ((((old >> 18) ^ old) >> 27) as u32).rotate_right((old >> 59) as u32)
+        Self(rand_pcg::Pcg32::new(seed, sequence))
     }
 
     /// Uniform in `[0, 1)`.
     fn f(&mut self) -> f64 {
-        f64::from(self.next_u32() >> 8) / 16_777_216.0
+        f64::from(self.0.next_u32() >> 8) / 16_777_216.0
     }
 
     fn vector(&mut self) -> DVec3 {

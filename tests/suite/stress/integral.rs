@@ -2,9 +2,9 @@
 
 use fanlight::{Hit, LightSample, ShadingPoint};
 
+use super::rows::Row;
 use crate::common::density::{OnTriangle, id, probes};
 use crate::common::lights::Point;
-use crate::rows::Row;
 
 /// Triangles that together have less probability than this are left out of an integral.
 const NEGLIGIBLE: f64 = 1e-6;

@@ -1,14 +1,11 @@
 //! Weights that a function gives, next to an image of the same function.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
-use common::density::{OnTriangle, bin, probes};
-use common::lights::Lights;
-use common::parallel;
-use common::pcg::Pcg32;
-use common::scene::{LightMesh, Scene, Sky};
-use common::statistics::{Mean, chi_square, sidak};
+use crate::common::density::{OnTriangle, bin, probes};
+use crate::common::lights::Lights;
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{LightMesh, Scene, Sky};
+use crate::common::statistics::{Mean, chi_square, sidak};
 use fanlight::{
     Error, Filter, Illumination, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Procedural, ShadingPoint,
     Texture, Weight,
@@ -244,7 +241,7 @@ fn cells(count: u32, scale: f32, function: &dyn Procedural) -> usize {
     let lights = builder.build().expect("the lights are valid");
     let mut bytes = lights.to_bytes();
     bytes.resize(bytes.len().next_multiple_of(4), 0);
-    let words = common::lights::aligned(&bytes);
+    let words = crate::common::lights::aligned(&bytes);
     LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
     lights.as_view().bytes()[2]
 }

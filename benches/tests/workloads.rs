@@ -1,10 +1,10 @@
 //! The generators and oracles of the quality bench reproduce the published check values.
 
 #[expect(dead_code, reason = "the bench uses all of it")]
-#[path = "../benches/quality/oracle/mod.rs"]
+#[path = "../quality/oracle/mod.rs"]
 mod oracle;
 #[expect(dead_code, reason = "the bench uses all of it")]
-#[path = "../benches/quality/scenes/mod.rs"]
+#[path = "../quality/scenes/mod.rs"]
 mod scenes;
 
 use fanlight::{Receiver, ShadingPoint};

@@ -5,11 +5,11 @@ use core::fmt::Write;
 use fanlight::{Hit, LightSample, TriangleId};
 use glam::Vec3;
 
-use crate::columns;
+use super::columns;
+use super::measure::{Effort, Found, describe, measure};
+use super::rows::{self, Sizes};
 use crate::common::lights::{Point, build};
 use crate::common::parallel;
-use crate::measure::{Effort, Found, describe, measure};
-use crate::rows::{self, Sizes};
 
 /// Bars of the errors.
 const NORMALISATION: f64 = 1e-4;

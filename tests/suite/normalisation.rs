@@ -1,15 +1,12 @@
 //! For every shading point, the density of all points of all triangles integrates to the probability that `sample`
 //! returns one.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
-use common::density::{OnTriangle, id, probes};
-use common::lights::{ARITIES, Lights, build};
-use common::parallel;
-use common::pcg::Pcg32;
-use common::scene::{Content, Scene, random_point};
-use common::statistics::{binomial_p, sidak};
+use crate::common::density::{OnTriangle, id, probes};
+use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Content, Scene, random_point};
+use crate::common::statistics::{binomial_p, sidak};
 use fanlight::{Hit, LightSample, ShadingPoint};
 use glam::Vec3;
 

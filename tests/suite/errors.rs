@@ -1,14 +1,11 @@
 //! Bad input is a clear error, and nothing that was accepted makes sampling panic.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
 use core::panic::AssertUnwindSafe;
 use std::panic::catch_unwind;
 
-use common::lights::{ARITIES, aligned, build};
-use common::pcg::Pcg32;
-use common::scene::{Content, Scene};
+use crate::common::lights::{ARITIES, aligned, build};
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Content, Scene};
 use fanlight::{
     Environment, Error, Filter, Hit, LightSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Receiver,
     ShadingPoint, Splitting, Texture, TextureId, TriangleId, Weight,
@@ -171,7 +168,8 @@ fn full() -> (Scene, LightSampler) {
         (image.size, image.texels) = ([2, 2], vec![0.0, 1.0, 2.0, 3.0]);
     }
     scene.meshes.iter_mut().for_each(|mesh| mesh.uvs.iter_mut().for_each(|uv| *uv *= 0.5));
-    scene.sky = common::scene::Sky::LatLong { size: [4, 2], texels: vec![1.0, 2.0, 0.0, 4.0, 5.0, 6.0, 7.0, 8.0] };
+    scene.sky =
+        crate::common::scene::Sky::LatLong { size: [4, 2], texels: vec![1.0, 2.0, 0.0, 4.0, 5.0, 6.0, 7.0, 8.0] };
     let lights = scene.build::<16, 4>();
     (scene, lights)
 }
@@ -240,7 +238,7 @@ fn bytes_with_a_flipped_bit() {
     let (_, lights) = full();
     let mut words = aligned(&lights.to_bytes());
     let mut pcg = Pcg32::new(5, 25);
-    let points: [ShadingPoint; 6] = core::array::from_fn(|i| common::scene::random_point(&mut pcg, i));
+    let points: [ShadingPoint; 6] = core::array::from_fn(|i| crate::common::scene::random_point(&mut pcg, i));
     let (mut refused, mut accepted) = (0, 0);
     let mut failed = Vec::new();
     for word in 0..words.len() {

@@ -4,7 +4,7 @@
 //! example does.
 
 #[expect(dead_code, unused_imports, reason = "the example uses the rest")]
-#[path = "../examples/room/render/mod.rs"]
+#[path = "../../room/render/mod.rs"]
 mod render;
 
 use std::path::{Path, PathBuf};
@@ -101,7 +101,7 @@ fn check_convergence(few: &Film, many: &Film, reference: &Reference, noise: f64)
 
 /// A file of the reference data. `None`, with a printed line, where it is absent.
 fn data(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/room").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/room").join(name);
     let exists = path.exists();
     if !exists {
         println!("skipped: no {}", path.display());

@@ -1,15 +1,12 @@
 //! Builds of many lights: no input takes long, no number of threads changes a bit, and a host can follow and stop one.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicUsize, Ordering};
 use core::time::Duration;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use common::pcg::Pcg32;
+use crate::common::pcg::Pcg32;
 use fanlight::{LightSampler, LightSamplerBuilder, Mesh};
 use glam::Vec3;
 

@@ -2,10 +2,6 @@
 //!
 //! `cargo test --release --test stress -- --ignored --nocapture table` prints the table of `docs/STABILITY.md`.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-#[path = "../common/mod.rs"]
-mod common;
-
 mod columns;
 mod estimate;
 mod exact;

@@ -3,12 +3,12 @@
 use fanlight::{Hit, LightSample, ShadingPoint};
 use glam::DVec3;
 
+use super::measure::Effort;
+use super::rows::Row;
 use crate::common::density::id;
 use crate::common::lights::Point;
 use crate::common::oracle;
 use crate::common::pcg::Pcg32;
-use crate::measure::Effort;
-use crate::rows::Row;
 
 /// Independent sets of points, whose spread tells the error of their mean.
 const SETS: usize = 32;

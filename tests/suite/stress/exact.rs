@@ -6,9 +6,9 @@
 use fanlight::{Receiver, ShadingPoint};
 use glam::{DVec2, DVec3};
 
+use super::sky;
 use crate::common::oracle;
 use crate::common::scene::{Image, LightMesh, Paint, Scene};
-use crate::sky;
 
 /// Of a part of a light: the place relative to the shading point, and the texture coordinates.
 type Corner = (DVec3, DVec2);

@@ -1,13 +1,10 @@
 //! A density that `sample` reports is the density that is found for the same point later.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
-use common::hostile::{MOVED, hostile, random_scene, shading_point};
-use common::lights::{ARITIES, Point, build};
-use common::parallel;
-use common::pcg::Pcg32;
-use common::scene::{Content, LightMesh, Paint, Scene, Sky, random_point};
+use crate::common::hostile::{MOVED, hostile, random_scene, shading_point};
+use crate::common::lights::{ARITIES, Point, build};
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Content, LightMesh, Paint, Scene, Sky, random_point};
 use fanlight::{LightSample, Receiver, ShadingPoint, Splitting};
 use glam::Vec3;
 

@@ -3,25 +3,16 @@
 //! `SAMPLES=1e9 cargo test --release --test double_check -- --ignored --nocapture`; with `FIRST=3400` before it, from that
 //! scene on.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-// The scenes of the fuzz targets.
-#[expect(dead_code, reason = "the lights of any bytes are all that is built")]
-#[path = "fuzz/checks/build.rs"]
-mod build;
-#[expect(dead_code, reason = "one scene never reaches the end of its bytes")]
-#[path = "fuzz/checks/reader.rs"]
-mod reader;
-
 use core::fmt::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use common::hostile::{hostile, random_scene, shading_point};
-use common::lights::{ARITIES, Lights, build};
-use common::parallel;
-use common::pcg::Pcg32;
-use common::scene::random_point;
+use crate::checks;
+use crate::common::hostile::{hostile, random_scene, shading_point};
+use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::random_point;
 use fanlight::{LightSample, ShadingPoint};
 
 /// Largest relative difference of two densities of one point.
@@ -81,7 +72,7 @@ fn scene(number: usize, pcg: &mut Pcg32) -> (Box<dyn Lights>, Vec<ShadingPoint>)
         let points = (0..POINTS).map(&mut any_point).collect();
         loop {
             let bytes: Vec<u8> = (0..1500).map(|_| pcg.u32() as u8).collect();
-            if let Some(lights) = build::lights(&mut reader::Reader::new(&bytes)) {
+            if let Some(lights) = checks::build::lights(&mut checks::reader::Reader::new(&bytes)) {
                 return (Box::new(lights), points);
             }
         }

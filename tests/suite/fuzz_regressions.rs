@@ -1,8 +1,6 @@
 //! The checks of the fuzz targets, for inputs that once failed and for random ones.
 
-#[path = "fuzz/checks/mod.rs"]
-mod checks;
-
+use crate::checks;
 use fanlight::{Environment, Filter, LightSampler, LightSamplerView, Mesh, Receiver, ShadingPoint, Sides};
 use glam::Vec3;
 use rand_pcg::{Pcg32, rand_core::Rng};

@@ -1,14 +1,11 @@
 //! Samples fall where the density says.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
-use common::density::{OnTriangle, bin, id, probes};
-use common::lights::{ARITIES, build};
-use common::parallel;
-use common::pcg::Pcg32;
-use common::scene::{Content, Scene, random_point};
-use common::statistics::{binomial_p, chi_square, sidak};
+use crate::common::density::{OnTriangle, bin, id, probes};
+use crate::common::lights::{ARITIES, build};
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Content, Scene, random_point};
+use crate::common::statistics::{binomial_p, chi_square, sidak};
 use fanlight::{Hit, ShadingPoint, Splitting};
 use glam::Vec3;
 
@@ -216,7 +213,7 @@ fn splitting_visits_triangles_as_often_as_it_expects() {
 #[test]
 fn equal_lights_are_chosen_equally_often_at_any_depth() {
     let mut scene = Scene::new("row", Vec::new());
-    let mut mesh = common::scene::LightMesh::new(Vec::new(), Vec::new()).two_sided();
+    let mut mesh = crate::common::scene::LightMesh::new(Vec::new(), Vec::new()).two_sided();
     for i in 0..4096u32 {
         let corner = Vec3::new(i as f32, 0.0, 0.0);
         mesh.positions.extend([corner, corner + 0.5 * Vec3::X, corner + 0.5 * Vec3::Y]);

@@ -1,10 +1,10 @@
 //! Renders the gallery's scenes without and with `fanlight`: whatever techniques are used, the mean is the same.
 
 #[expect(dead_code, unused_imports, reason = "the example uses the rest")]
-#[path = "../examples/gallery/render/mod.rs"]
+#[path = "../render/mod.rs"]
 mod render;
 #[expect(dead_code, unused_imports, reason = "the example uses the rest")]
-#[path = "../examples/gallery/scenes/mod.rs"]
+#[path = "../scenes/mod.rs"]
 mod scenes;
 
 use render::{Budget, LightChoice, PathTracer, Progressive, Published, Techniques, World};

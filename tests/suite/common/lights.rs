@@ -12,10 +12,8 @@ pub(crate) trait Lights: Sync {
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<LightSample>;
     fn pdf(&self, x: &ShadingPoint, hit: &Hit) -> f32;
     fn pmf(&self, x: &ShadingPoint, triangle: TriangleId) -> f32;
-    fn pdf_direction(&self, x: &ShadingPoint, direction: Vec3) -> f32;
     fn pdf_sample_direction(&self, x: &ShadingPoint, sample: &LightSample) -> f32;
     fn pdf_split(&self, x: &ShadingPoint, hit: &Hit, splitting: &Splitting) -> f32;
-    fn pdf_split_direction(&self, x: &ShadingPoint, direction: Vec3, splitting: &Splitting) -> f32;
     fn sample_split(&self, x: &ShadingPoint, u: [f32; 3], splitting: &Splitting) -> SmallVec<[LightSample; 16]>;
     fn to_bytes(&self) -> Vec<u8>;
     /// Samples of the same sampler after a round trip through bytes, all at once.
@@ -39,20 +37,12 @@ impl<const N: usize, const M: usize> Lights for LightSampler<N, M> {
         LightSampler::pmf(self, x, triangle)
     }
 
-    fn pdf_direction(&self, x: &ShadingPoint, direction: Vec3) -> f32 {
-        LightSampler::pdf_direction(self, x, direction)
-    }
-
     fn pdf_sample_direction(&self, x: &ShadingPoint, sample: &LightSample) -> f32 {
         LightSampler::pdf_sample_direction(self, x, sample)
     }
 
     fn pdf_split(&self, x: &ShadingPoint, hit: &Hit, splitting: &Splitting) -> f32 {
         LightSampler::pdf_split(self, x, hit, splitting)
-    }
-
-    fn pdf_split_direction(&self, x: &ShadingPoint, direction: Vec3, splitting: &Splitting) -> f32 {
-        LightSampler::pdf_split_direction(self, x, direction, splitting)
     }
 
     fn sample_split(&self, x: &ShadingPoint, u: [f32; 3], splitting: &Splitting) -> SmallVec<[LightSample; 16]> {

@@ -2,18 +2,13 @@
 //!
 //! `GOLDEN=write cargo test --test golden` writes down what is found. Angles come from the system's library of functions
 //! or, without `std`, from `libm`, so that there is a list for each, and they hold for the system that they were made on.
-#![cfg(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))]
-
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
 use std::path::Path;
 
-use common::hostile::{random_scene, shading_point};
-use common::lights::{ARITIES, Lights, build};
-use common::parallel;
-use common::pcg::Pcg32;
-use common::scene::Scene;
+use crate::common::hostile::{random_scene, shading_point};
+use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::Scene;
 use fanlight::{LightSample, ShadingPoint, Splitting, TriangleId};
 
 const SCENES: usize = 70;

@@ -4,14 +4,11 @@
 //! seeds are fixed, it either does or does not. A point that is off is done again with ten times the samples, which
 //! tells bias from chance.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
-use common::lights::{ARITIES, Lights, build};
-use common::pcg::Pcg32;
-use common::scene::{Image, LightMesh, Paint, Scene, Sky, random_point};
-use common::statistics::Mean;
-use common::{oracle, parallel};
+use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky, random_point};
+use crate::common::statistics::Mean;
+use crate::common::{oracle, parallel};
 use fanlight::{Filter, LightSample, Receiver, ShadingPoint, Splitting, Wrap};
 use glam::{DVec3, Vec3};
 

@@ -3,16 +3,16 @@
 use fanlight::{Hit, LightSample, ShadingPoint};
 use glam::DVec3;
 
-use crate::columns;
+use super::columns;
+use super::estimate::{LIMIT, crossing, estimate, relative_variance};
+use super::exact;
+use super::integral;
+use super::numbers::HOSTILE;
+use super::rows::Row;
 use crate::common::density::id;
 use crate::common::lights::Point;
 use crate::common::oracle;
 use crate::common::pcg::Pcg32;
-use crate::estimate::{LIMIT, crossing, estimate, relative_variance};
-use crate::exact;
-use crate::integral;
-use crate::numbers::HOSTILE;
-use crate::rows::Row;
 
 /// Share of the unoccluded irradiance below which an estimate is not judged.
 const DARK: f64 = 1e-6;

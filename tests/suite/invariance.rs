@@ -1,14 +1,11 @@
 //! What a scene sends does not depend on the order of its triangles, on their number, on the order of their vertices,
 //! nor on where and how large it is.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
-use common::oracle;
-use common::parallel;
-use common::pcg::Pcg32;
-use common::scene::{Content, Scene, random_point};
-use common::statistics::Mean;
+use crate::common::oracle;
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Content, Scene, random_point};
+use crate::common::statistics::Mean;
 use fanlight::{Hit, Illumination, LightSample, LightSampler, Receiver, ShadingPoint, TriangleId};
 use glam::{Mat3, Vec3};
 

@@ -1,12 +1,8 @@
 //! A sun through a window: the second technique next to the trees.
 
-#[path = "common/pcg.rs"]
-#[expect(dead_code, reason = "other tests use the rest")]
-mod pcg;
-
+use crate::common::pcg::Pcg32;
 use fanlight::{Environment, Filter, Hit, LightSample, LightSampler, Mesh, ShadingPoint, Splitting, Texture, Weight};
 use glam::{Vec2, Vec3};
-use pcg::Pcg32;
 use smallvec::SmallVec;
 
 const SIZE: usize = 256;

@@ -1,13 +1,10 @@
 //! A sampler whose lights have moved or changed their brightness keeps all promises of one that was built anew.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
-use common::density::{OnTriangle, id, probes};
-use common::pcg::Pcg32;
-use common::scene::{Content, LightMesh, Paint, Scene, random_point};
-use common::statistics::Mean;
-use common::{oracle, parallel};
+use crate::common::density::{OnTriangle, id, probes};
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Content, LightMesh, Paint, Scene, random_point};
+use crate::common::statistics::Mean;
+use crate::common::{oracle, parallel};
 use fanlight::{
     Environment, Error, Filter, Hit, LightSample, LightSampler, Mesh, MeshUpdate, ShadingPoint, TriangleId,
 };
@@ -381,7 +378,7 @@ fn bytes_hold_what_has_changed() {
     let mut lights = scene.build::<16, 4>();
     let (other, scales) = changed(&scene, &mut pcg);
     refit(&mut lights, &other, &scales);
-    let words = common::lights::aligned(&lights.to_bytes());
+    let words = crate::common::lights::aligned(&lights.to_bytes());
     let view = fanlight::LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes load");
     for i in 0..2000 {
         let (x, u) = (random_point(&mut pcg, i), pcg.cube());

@@ -3,14 +3,11 @@
 //!
 //! A family of scenes passes if the deviations of its scenes, four standard errors at most each, do so.
 
-#[expect(dead_code, reason = "every test uses a part of what they share")]
-mod common;
-
-use common::oracle;
-use common::parallel;
-use common::pcg::Pcg32;
-use common::scene::{Image, LightMesh, Paint, Scene, Sky};
-use common::statistics::Mean;
+use crate::common::oracle;
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky};
+use crate::common::statistics::Mean;
 use fanlight::{Emission, EmissionSample, Filter, LightSampler, ShadingPoint};
 use glam::Vec3;
 
