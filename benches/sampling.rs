@@ -3,6 +3,9 @@
 //! `cloud-N` is `N` small triangles at random in the unit cube, each a mesh with a radiance of its own; the shading
 //! points lie in and around the cube. `batch` runs 10,000,000 triangles as well if `FANLIGHT_LARGE` is set.
 
+#[path = "instruction_set.rs"]
+mod instruction_set;
+
 use core::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
@@ -178,6 +181,7 @@ fn environment(criterion: &mut Criterion) {
 }
 
 fn main() {
+    println!("times with the instructions {}", instruction_set::name());
     let mut criterion = Criterion::default().configure_from_args();
     environment(&mut criterion);
     lights(&mut criterion);
