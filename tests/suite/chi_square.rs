@@ -6,6 +6,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene, random_point};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
+use crate::common::tier::{some, tier};
 use fanlight::{Hit, ShadingPoint, Splitting};
 use glam::Vec3;
 
@@ -13,7 +14,6 @@ use glam::Vec3;
 const SIGNIFICANCE: f64 = 0.01;
 /// Triangles are cut into 4^DEPTH cells.
 const DEPTH: u32 = 2;
-const SAMPLES: usize = 100_000;
 /// Samples of each cell that guide the integration.
 const PROBES: f64 = 50.0;
 
@@ -26,6 +26,7 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     let lights = build(&scene, arities);
     let x = random_point(&mut pcg, receiver);
     let bins = 1 << (2 * DEPTH);
+    let samples = tier().histogram;
     let mut firsts = Vec::new();
     let mut total = 0;
     for mesh in &scene.meshes {
@@ -34,7 +35,7 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     }
     let mut observed = vec![0.0; total * bins + 1];
     let mut kept = Vec::new();
-    for _ in 0..SAMPLES {
+    for _ in 0..samples {
         match lights.sample(&x, pcg.cube()) {
             Some(sample) => {
                 let triangle = firsts[sample.hit.triangle.mesh as usize] + sample.hit.triangle.triangle as usize;
@@ -69,13 +70,13 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
             _ => 2,
         };
         let (integrals, _) = on.integrate(DEPTH, least_depth, &probes[triangle.0][triangle.1]);
-        expected.extend(integrals.iter().map(|share| share * SAMPLES as f64));
+        expected.extend(integrals.iter().map(|share| share * samples as f64));
     }
-    let shortfall = SAMPLES as f64 - expected.iter().sum::<f64>();
+    let shortfall = samples as f64 - expected.iter().sum::<f64>();
     expected.push(shortfall.max(0.0));
     // A shortfall as small as the error of the integrals cannot be judged.
     let misses = observed.len() - 1;
-    if expected[misses].max(observed[misses]) < 3e-4 * SAMPLES as f64 {
+    if expected[misses].max(observed[misses]) < 3e-4 * samples as f64 {
         (expected[misses], observed[misses]) = (0.0, 0.0);
     }
     let (p, dump) = chi_square(&observed, &expected);
@@ -95,13 +96,17 @@ fn contents() -> Vec<Content> {
 #[test]
 fn samples_fill_the_cells_of_triangles_as_the_density_says() {
     let contents = contents();
-    let count = 3 * contents.len();
+    let numbers = some(3 * contents.len());
+    let count = numbers.len();
     let significance = sidak(SIGNIFICANCE, count);
-    let found = parallel::map(count, |i| cells(contents[i / 3], i / 3, i % 3, false));
+    let found = parallel::map(count, |k| {
+        let i = numbers[k];
+        cells(contents[i / 3], i / 3, i % 3, false)
+    });
     let failed: Vec<_> = found.iter().filter(|(p, _)| *p < significance).collect();
     failed.iter().for_each(|(_, dump)| eprintln!("{dump}"));
     let least = found.iter().fold(1.0f64, |least, (p, _)| least.min(*p));
-    println!("{count} points of {SAMPLES} samples, least p {least:e}, limit {significance:e}");
+    println!("{count} points of {} samples, least p {least:e}, limit {significance:e}", tier().histogram);
     assert!(failed.is_empty(), "{} of {count} histograms fail", failed.len());
 }
 
@@ -123,7 +128,7 @@ fn cloud(number: usize) -> (Scene, ShadingPoint, Pcg32) {
 #[test]
 fn triangles_are_chosen_with_their_probability() {
     let count = 3;
-    let samples = 1_000_000;
+    let samples = 10 * tier().histogram;
     let found = parallel::map(count, |i| {
         let (scene, x, mut pcg) = cloud(i);
         let lights = build(&scene, ARITIES[i]);
@@ -134,7 +139,7 @@ fn triangles_are_chosen_with_their_probability() {
             let place = chosen.map_or(Ok(triangles.len()), |chosen| triangles.binary_search(&chosen));
             observed[place.expect("the triangle is one of the scene's")] += 1.0;
         }
-        let n = f64::from(samples);
+        let n = samples as f64;
         let mut expected: Vec<_> = triangles.iter().map(|t| n * f64::from(lights.pmf(&x, *t))).collect();
         expected.push((n - expected.iter().sum::<f64>()).max(0.0));
         if expected[triangles.len()] < 1e-6 * n {
@@ -157,7 +162,8 @@ fn triangles_are_chosen_with_their_probability() {
 /// One split gives no triangle twice, so that each triangle's count is binomial whatever its neighbours do.
 #[test]
 fn splitting_visits_triangles_as_often_as_it_expects() {
-    let settings = [(0.5, 1, 200_000), (0.9, 2, 120_000), (1.0, 2, 10_000)];
+    let rounds = tier().histogram;
+    let settings = [(0.5, 1, 2 * rounds), (0.9, 2, rounds), (1.0, 2, rounds / 10)];
     let found = parallel::map(settings.len(), |i| {
         let (threshold, levels, rounds) = settings[i];
         let splitting = Splitting { threshold, levels };
@@ -189,7 +195,7 @@ fn splitting_visits_triangles_as_often_as_it_expects() {
     });
     let significance = sidak(SIGNIFICANCE, found.iter().map(|f| f.0.len() + 1).sum());
     for ((observed, expected, drawn), setting) in found.into_iter().zip(settings) {
-        let n = f64::from(setting.2);
+        let n = setting.2 as f64;
         let p = |expected: f64, i: usize| binomial_p(f64::from(observed[i]), n, expected.min(1.0));
         for (i, &e) in expected.iter().enumerate() {
             if e > 0.999_99 {

@@ -1,6 +1,6 @@
 //! The densities of very many samples of random scenes: as many as the environment variable `SAMPLES` asks for.
 //!
-//! `SAMPLES=1e9 cargo test --release --test double_check -- --ignored --nocapture`; with `FIRST=3400` before it, from that
+//! `SAMPLES=1e9 cargo test --release --test suite -- double_check --ignored --nocapture`; with `FIRST=3400` before it, from that
 //! scene on.
 
 use core::fmt::Write;
@@ -101,7 +101,7 @@ fn examine(number: usize) -> Counts {
 }
 
 #[test]
-#[ignore = "as long as SAMPLES asks for; SAMPLES=1e9 cargo test --release --test double_check -- --ignored --nocapture"]
+#[ignore = "as long as SAMPLES asks for; SAMPLES=1e9 cargo test --release --test suite -- double_check --ignored --nocapture"]
 fn all_samples_have_the_density_that_pdf_finds() {
     let samples: f64 = std::env::var("SAMPLES").map_or(1e6, |samples| samples.parse().expect("a number of samples"));
     let scenes = (samples / (POINTS * SAMPLES) as f64).ceil() as usize;

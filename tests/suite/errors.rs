@@ -174,8 +174,8 @@ fn full() -> (Scene, LightSampler) {
     (scene, lights)
 }
 
-/// Everything that a host can ask, where results must at least be numbers.
-fn exercise(view: &View<'_>, x: &ShadingPoint, u: [f32; 3]) {
+/// Everything that a host can ask, where results must at least be numbers. Returns the number of samples.
+fn exercise(view: &View<'_>, x: &ShadingPoint, u: [f32; 3]) -> usize {
     let finite = |pdf: f32| assert!(pdf.is_finite() && pdf >= 0.0, "a density of {pdf} at {x:?} with {u:?}");
     let splitting = Splitting { threshold: 0.8, levels: 2 };
     let check = |sample: &LightSample| {
@@ -186,9 +186,8 @@ fn exercise(view: &View<'_>, x: &ShadingPoint, u: [f32; 3]) {
         finite(view.pdf_sample_direction(x, sample));
         assert!(!sample.position.is_nan() && sample.direction.is_finite() && sample.distance.is_finite());
     };
-    if let Some(sample) = view.sample(x, u) {
-        check(&sample);
-    }
+    let single = view.sample(x, u);
+    single.iter().for_each(check);
     let mut samples = SmallVec::<[LightSample; 8]>::new();
     view.sample_split(x, u, &splitting, &mut samples);
     samples.iter().for_each(check);
@@ -202,6 +201,7 @@ fn exercise(view: &View<'_>, x: &ShadingPoint, u: [f32; 3]) {
             finite(view.pmf(x, triangle));
         }
     }
+    single.iter().len() + samples.len()
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn bytes_with_a_flipped_bit() {
     let mut words = aligned(&lights.to_bytes());
     let mut pcg = Pcg32::new(5, 25);
     let points: [ShadingPoint; 6] = core::array::from_fn(|i| crate::common::scene::random_point(&mut pcg, i));
-    let (mut refused, mut accepted) = (0, 0);
+    let (mut refused, mut accepted, mut drawn) = (0, 0, 0);
     let mut failed = Vec::new();
     for word in 0..words.len() {
         for bit in 0..32 {
@@ -251,9 +251,10 @@ fn bytes_with_a_flipped_bit() {
                 }
                 Ok(view) => {
                     accepted += 1;
-                    let ask = || points.iter().for_each(|x| exercise(&view, x, pcg.cube()));
-                    if catch_unwind(AssertUnwindSafe(ask)).is_err() {
-                        failed.push((word, bit));
+                    let ask = || points.iter().map(|x| exercise(&view, x, pcg.cube())).sum::<usize>();
+                    match catch_unwind(AssertUnwindSafe(ask)) {
+                        Ok(samples) => drawn += samples,
+                        Err(_) => failed.push((word, bit)),
                     }
                 }
             }
@@ -262,14 +263,14 @@ fn bytes_with_a_flipped_bit() {
     }
     println!("{} words, {refused} flips refused, {accepted} accepted, {} of them bad", words.len(), failed.len());
     assert!(failed.is_empty(), "(word, bit) {failed:?}");
-    assert!(refused > 1000 && accepted > 1000);
+    assert!(refused > 1000 && accepted > 1000 && drawn > accepted, "{refused} {accepted} {drawn}");
 }
 
 #[test]
 fn hostile_shading_points_and_numbers() {
     let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 0.0, 1e-45, 0.5, 1.0, 1e30, f32::MAX];
     let mut pcg = Pcg32::new(6, 26);
-    let mut count = 0;
+    let (mut count, mut drawn) = (0, 0);
     for kind in 0..4 {
         let mut scene =
             Scene::random(&mut pcg, Content { triangles: 20, textured: true, sky: kind, two_sided: kind > 1 });
@@ -296,12 +297,14 @@ fn hostile_shading_points_and_numbers() {
                 let u =
                     if pcg.below(2) == 0 { pcg.cube() } else { core::array::from_fn(|_| bad[pcg.below(bad.len())]) };
                 let result = catch_unwind(AssertUnwindSafe(|| exercise(&view, &x, u)));
-                assert!(result.is_ok(), "{x:?} with {u:?} in {}", scene.name);
+                let Ok(samples) = result else { panic!("{x:?} with {u:?} in {}", scene.name) };
+                drawn += samples;
                 count += 1;
             }
         }
     }
-    println!("{count} hostile shading points");
+    println!("{count} hostile shading points, {drawn} samples");
+    assert!(drawn > count / 10, "{count} points, {drawn} samples");
 }
 
 #[test]
@@ -310,7 +313,7 @@ fn nothing_arrives_from_no_lights() {
     let x = ShadingPoint::volume(Vec3::ZERO);
     assert_eq!(lights.sample(&x, [0.5; 3]), None);
     assert_eq!(lights.pdf_direction(&x, Vec3::Z), 0.0);
-    exercise(&lights.as_view(), &x, [0.1, 0.2, 0.3]);
+    assert_eq!(exercise(&lights.as_view(), &x, [0.1, 0.2, 0.3]), 0);
     // Black lights are none either, for every arity.
     let mut scene =
         Scene::random(&mut Pcg32::new(1, 27), Content { triangles: 9, textured: true, sky: 0, two_sided: true });

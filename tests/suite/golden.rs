@@ -1,6 +1,6 @@
 //! The bits of samples and densities at fixed seeds: whoever changes one should have meant to.
 //!
-//! `GOLDEN=write cargo test --test golden` writes down what is found. Angles come from the system's library of functions
+//! `GOLDEN=write cargo test golden` writes down what is found. Angles come from the system's library of functions
 //! or, without `std`, from `libm`, so that there is a list for each, and they hold for the system that they were made on.
 use std::path::Path;
 

@@ -3,6 +3,8 @@
 use fanlight::{LightSampler, Mesh, Texture, Weight};
 use glam::{Vec2, Vec3};
 
+use crate::common::tier::tier;
+
 const UVS: [Vec2; 4] = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
 
 /// Bytes of the trees over textures of so many windows with the same image.
@@ -71,7 +73,7 @@ fn many_triangles_share_what_a_small_image_may_take() {
 /// and all together what the edges of one image may.
 #[test]
 fn tiling_takes_bounded_memory() {
-    for size in [16, 64, 256] {
+    for &size in tier().tiles {
         let texels = ring(size);
         let tiled = |copies: f32| {
             let texture = Texture::new(size, size, &texels).expect("the image is finite");

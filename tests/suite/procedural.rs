@@ -141,13 +141,12 @@ fn samples_of_a_smooth_function_follow_the_density() {
 }
 
 #[test]
-#[ignore = "release tier: a minute; cargo test --release --test procedural -- --ignored"]
+#[ignore = "release tier: a minute; cargo test --release --test suite -- procedural --ignored"]
 fn samples_of_any_function_follow_the_density() {
     check_density(3 * CASES.len(), |i| i);
 }
 
 #[test]
-#[ignore = "release tier; cargo test --release --test procedural -- --ignored"]
 fn a_density_that_is_off_is_found() {
     let scene = light();
     assert!(examine(&sampler::<16, 4>(&scene, WAVES), &scene, &points()[0], 6, true).0 < 1e-9);

@@ -1,5 +1,7 @@
 //! Properties that hold for any scene that a builder accepts.
 
+use core::cell::Cell;
+
 use approx::assert_relative_eq;
 use fanlight::{
     Environment, Filter, Hit, LightSampler, LightSamplerView, Mesh, Receiver, ShadingPoint, Sides, Texture, TriangleId,
@@ -7,6 +9,9 @@ use fanlight::{
 };
 use glam::{DVec3, Vec2, Vec3};
 use proptest::prelude::*;
+use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
+
+use crate::common::tier::tier;
 
 /// Numbers that are often equal, tiny, huge or zero.
 fn coordinate() -> impl Strategy<Value = f32> {
@@ -51,6 +56,11 @@ fn soup() -> impl Strategy<Value = Soup> {
     let uv = [-3.0f32..3.0, -3.0f32..3.0];
     let uvs = [uv.clone(), uv.clone(), uv];
     prop::collection::vec((triangle(), uvs, any::<bool>(), any::<bool>()), 1..20)
+}
+
+/// Three random numbers.
+fn numbers() -> impl Strategy<Value = [f32; 3]> {
+    [0.0f32..1.0, 0.0f32..1.0, 0.0f32..1.0]
 }
 
 fn texels() -> impl Strategy<Value = Vec<f32>> {
@@ -98,32 +108,50 @@ fn build(soup: &Soup, texels: &[f32], sky: &[f32], scale: f32) -> LightSampler {
     builder.build().expect("there are few triangles")
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::with_cases(400) })]
+/// Checks a property in as many cases as the tier says. The property returns how many things it has compared: `least` of
+/// them a case, on average, or it has shown nothing.
+fn check<S: Strategy>(strategy: S, least: f64, property: impl Fn(S::Value) -> Result<usize, TestCaseError>) {
+    let cases = tier().cases;
+    let config = Config { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..Config::with_cases(cases) };
+    let compared = Cell::new(0);
+    let result = TestRunner::new(config).run(&strategy, |values| {
+        compared.set(compared.get() + property(values)?);
+        Ok(())
+    });
+    result.unwrap_or_else(|error| panic!("{error}"));
+    let compared = compared.into_inner();
+    println!("{compared} comparisons in {cases} cases");
+    assert!(compared as f64 > least * f64::from(cases), "only {compared} comparisons in {cases} cases");
+}
 
-    #[test]
-    fn a_sample_has_the_density_that_pdf_finds(
-        soup in soup(), texels in texels(), sky in texels(), x in shading_point(),
-        us in prop::collection::vec([0.0f32..1.0, 0.0f32..1.0, 0.0f32..1.0], 30),
-    ) {
+#[test]
+fn a_sample_has_the_density_that_pdf_finds() {
+    let numbers = prop::collection::vec(numbers(), 30);
+    let strategy = (soup(), texels(), texels(), shading_point(), numbers);
+    check(strategy, 3.0, |(soup, texels, sky, x, us)| {
         let lights = build(&soup, &texels, &sky, 1.0);
+        let mut compared = 0;
         for u in us {
             if let Some(sample) = lights.sample(&x, u) {
+                compared += 1;
                 assert_relative_eq!(lights.pdf(&x, &sample.hit), sample.pdf, max_relative = 1e-5);
                 prop_assert!(sample.pdf.is_normal() && sample.pdf_area > 0.0 && sample.distance > 0.0);
                 prop_assert!(lights.pdf_sample_direction(&x, &sample) >= sample.pdf);
                 assert_relative_eq!(sample.direction.length(), 1.0, max_relative = 1e-5);
             }
         }
-    }
+        Ok(compared)
+    });
+}
 
-    /// Untextured triangles of a sky that is nowhere black: they send light wherever a side that is lit is seen.
-    #[test]
-    fn what_sends_light_can_be_drawn(
-        soup in soup(), x in shading_point(), places in prop::collection::vec([0.0f64..1.0, 0.0f64..1.0], 30),
-    ) {
+/// Untextured triangles of a sky that is nowhere black: they send light wherever a side that is lit is seen.
+#[test]
+fn what_sends_light_can_be_drawn() {
+    let strategy = (soup(), shading_point(), prop::collection::vec([0.0f64..1.0, 0.0f64..1.0], 30));
+    check(strategy, 1.0, |(soup, x, places)| {
         let soup: Soup = soup.into_iter().map(|(corners, uvs, portal, _)| (corners, uvs, portal, false)).collect();
         let lights = build(&soup, &[1.0; 16], &[1.0; 16], 1.0);
+        let mut compared = 0;
         for ((number, (corners, ..)), [u, v]) in soup.iter().enumerate().cycle().zip(places) {
             let [a, b, c] = seen(*corners, &x);
             let [b1, b2] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
@@ -136,19 +164,21 @@ proptest! {
             if lit < 1e-3 || cosine(&x, at.normalize()) < 1e-3 || is_thin || at.length() < 1e-5 * f64::from(size) {
                 continue;
             }
-            let hit = Hit {
-                triangle: TriangleId { mesh: number as u32, triangle: 0 },
-                barycentrics: [b1 as f32, b2 as f32],
-            };
+            let hit =
+                Hit { triangle: TriangleId { mesh: number as u32, triangle: 0 }, barycentrics: [b1 as f32, b2 as f32] };
             prop_assert!(lights.pdf(&x, &hit) > 0.0, "{hit:?} sends light to {x:?}");
+            compared += 1;
         }
-    }
+        Ok(compared)
+    });
+}
 
-    #[test]
-    fn the_density_of_a_direction_is_the_sum_over_what_it_crosses(
-        soup in soup(), texels in texels(), sky in texels(), x in shading_point(), places in prop::collection::vec(point(), 10),
-    ) {
+#[test]
+fn the_density_of_a_direction_is_the_sum_over_what_it_crosses() {
+    let strategy = (soup(), texels(), texels(), shading_point(), prop::collection::vec(point(), 10));
+    check(strategy, 1.0, |(soup, texels, sky, x, places)| {
         let lights = build(&soup, &texels, &sky, 1.0);
+        let mut compared = 0;
         for place in places {
             let direction = (place - x.position).normalize_or(Vec3::X);
             let mut sum = 0.0;
@@ -171,32 +201,38 @@ proptest! {
                 let found = lights.pdf_direction(&x, direction);
                 prop_assert_eq!(found > 0.0, sum > 0.0);
                 assert_relative_eq!(found, sum, max_relative = 1e-3);
+                compared += usize::from(found > 0.0);
             }
         }
-    }
+        Ok(compared)
+    });
+}
 
-    #[test]
-    fn bytes_hold_the_same_lights(
-        soup in soup(), texels in texels(), sky in texels(), x in shading_point(), u in [0.0f32..1.0, 0.0f32..1.0, 0.0f32..1.0],
-    ) {
+#[test]
+fn bytes_hold_the_same_lights() {
+    let strategy = (soup(), texels(), texels(), shading_point(), numbers());
+    check(strategy, 0.1, |(soup, texels, sky, x, u)| {
         let lights = build(&soup, &texels, &sky, 1.0);
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&lights.to_bytes());
-        let view: LightSamplerView<'_> = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes are whole");
-        prop_assert_eq!(view.sample(&x, u), lights.sample(&x, u));
-    }
+        let view: LightSamplerView<'_> =
+            LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes are whole");
+        let sample = lights.sample(&x, u);
+        prop_assert_eq!(view.sample(&x, u), sample);
+        Ok(usize::from(sample.is_some()))
+    });
+}
 
-    /// A power of two changes no digit of any length.
-    #[test]
-    fn a_larger_scene_has_the_same_densities(
-        soup in soup(), texels in texels(), sky in texels(), x in shading_point(), u in [0.0f32..1.0, 0.0f32..1.0, 0.0f32..1.0],
-        exponent in -12i32..12,
-    ) {
+/// A power of two changes no digit of any length.
+#[test]
+fn a_larger_scene_has_the_same_densities() {
+    let strategy = (soup(), texels(), texels(), shading_point(), numbers(), -12i32..12);
+    check(strategy, 0.1, |(soup, texels, sky, x, u, exponent)| {
         let scale = 2f32.powi(exponent);
         let (lights, larger) = (build(&soup, &texels, &sky, 1.0), build(&soup, &texels, &sky, scale));
         let far = ShadingPoint { position: x.position * scale, ..x };
-        if let (Some(a), Some(b)) = (lights.sample(&x, u), larger.sample(&far, u)) {
-            assert_relative_eq!(lights.pdf(&x, &a.hit), larger.pdf(&far, &a.hit), max_relative = 1e-4);
-            assert_relative_eq!(lights.pdf(&x, &b.hit), larger.pdf(&far, &b.hit), max_relative = 1e-4);
-        }
-    }
+        let (Some(a), Some(b)) = (lights.sample(&x, u), larger.sample(&far, u)) else { return Ok(0) };
+        assert_relative_eq!(lights.pdf(&x, &a.hit), larger.pdf(&far, &a.hit), max_relative = 1e-4);
+        assert_relative_eq!(lights.pdf(&x, &b.hit), larger.pdf(&far, &b.hit), max_relative = 1e-4);
+        Ok(1)
+    });
 }

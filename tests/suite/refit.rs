@@ -4,6 +4,7 @@ use crate::common::density::{OnTriangle, id, probes};
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LightMesh, Paint, Scene, random_point};
 use crate::common::statistics::Mean;
+use crate::common::tier::some;
 use crate::common::{oracle, parallel};
 use fanlight::{
     Environment, Error, Filter, Hit, LightSample, LightSampler, Mesh, MeshUpdate, ShadingPoint, TriangleId,
@@ -83,6 +84,7 @@ fn changes_can_be_taken_back() {
 
 #[test]
 fn the_density_is_that_of_the_samples() {
+    let mut drawn = 0;
     for number in 0..SCENES {
         let (scene, mut pcg) = scene(number, false);
         let mut lights = scene.build::<16, 4>();
@@ -91,6 +93,7 @@ fn the_density_is_that_of_the_samples() {
         for i in 0..3000 {
             let x = random_point(&mut pcg, i);
             let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
+            drawn += 1;
             let again = lights.pdf(&x, &sample.hit);
             assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{}: {} {again}", other.name, sample.pdf);
             let [a, b, c] =
@@ -100,12 +103,15 @@ fn the_density_is_that_of_the_samples() {
             assert!(there.distance(sample.position) < 1e-4, "the sample is not on the moved triangle");
         }
     }
+    assert!(drawn > 1000 * SCENES, "only {drawn} samples");
 }
 
 /// Volumes see every two-sided light, so nothing can be missed.
 #[test]
 fn the_density_integrates_to_one() {
-    let found = parallel::map(SCENES, |number| {
+    let numbers = some(SCENES);
+    let found = parallel::map(numbers.len(), |k| {
+        let number = numbers[k];
         let (scene, mut pcg) = scene(number, true);
         let mut lights = scene.build::<4, 4>();
         let (other, scales) = changed(&scene, &mut pcg);
@@ -219,7 +225,6 @@ fn suns_are_seen_through_the_portals_that_are_on() {
     let mut texels = vec![1.0f32; 64 * 32];
     texels[3 * 64 + 10] = 5000.0;
     let sky = Environment::from_lat_long(64, 32, &texels, Filter::Nearest).expect("the sky is valid");
-    assert_eq!(sky.as_view().suns().len(), 1);
     let (phi, theta) = (core::f32::consts::TAU * 10.5 / 64.0, core::f32::consts::PI * 3.5 / 32.0);
     let sun = Vec3::new(phi.cos() * theta.sin(), -phi.sin() * theta.sin(), theta.cos());
     let side = sun.any_orthonormal_vector();
@@ -346,6 +351,7 @@ fn noise(lights: &LightSampler) -> f64 {
         1000.0 * (mean.error() / mean.mean()).powi(2)
     };
     let mut variances: Vec<f64> = points.iter().map(relative_variance).filter(|v| v.is_finite()).collect();
+    assert!(2 * variances.len() > points.len(), "only {} points are lit", variances.len());
     variances.sort_by(f64::total_cmp);
     variances[variances.len() / 2]
 }

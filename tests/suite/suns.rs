@@ -1,6 +1,7 @@
 //! A sun through a window: the second technique next to the trees.
 
 use crate::common::pcg::Pcg32;
+use crate::common::tier::some;
 use fanlight::{Environment, Filter, Hit, LightSample, LightSampler, Mesh, ShadingPoint, Splitting, Texture, Weight};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
@@ -80,11 +81,11 @@ impl Wall {
     }
 }
 
-/// Points that see the sun through the window, and its surroundings.
+/// Points that see the sun through the window, and its surroundings: some of twelve.
 fn points() -> Vec<ShadingPoint> {
     let mut pcg = Pcg32::new(1, 31);
     let mut cube = || pcg.cube().map(|u| u - 0.5);
-    (0..12)
+    let all: Vec<_> = (0..12)
         .map(|i| {
             let target = Vec3::new(0.0, 0.0, 1.5) + 0.6 * Vec3::from(cube()) * Vec3::new(1.0, 0.0, 1.0);
             let position = target - (1.0 + 0.1 * i as f32) * sun_direction();
@@ -95,7 +96,8 @@ fn points() -> Vec<ShadingPoint> {
                 _ => ShadingPoint::volume(position),
             }
         })
-        .collect()
+        .collect();
+    some(all.len()).into_iter().map(|i| all[i]).collect()
 }
 
 /// Mean and standard error.
@@ -111,23 +113,15 @@ fn estimate(n: usize, mut draw: impl FnMut() -> f64) -> (f64, f64) {
 }
 
 #[test]
-fn the_sun_is_found() {
-    let environment = environment();
-    assert_eq!(environment.as_view().suns().len(), 1);
-    let power = f64::from(environment.as_view().suns()[0].power);
-    let flux = f64::from(environment.mean()) * 4.0 * core::f64::consts::PI;
-    assert!(power > 0.4 * flux && power < flux, "{power} of {flux}");
-}
-
-#[test]
 fn densities_agree_in_and_beside_the_sun() {
     let mut pcg = Pcg32::new(2, 31);
     for wall in [Wall::Window, Wall::Nested, Wall::Holes(20), Wall::Clipped(20)] {
         let lights = wall.build();
-        let mut mismatches = 0;
+        let (mut mismatches, mut drawn) = (0, 0);
         for x in points() {
             for _ in 0..3000 {
                 let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
+                drawn += 1;
                 let again = lights.pdf(&x, &sample.hit);
                 assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{again} {}", sample.pdf);
                 let direction = lights.pdf_sample_direction(&x, &sample);
@@ -136,7 +130,8 @@ fn densities_agree_in_and_beside_the_sun() {
                 mismatches += u32::from((lights.pdf_direction(&x, sample.direction) / direction - 1.0).abs() > 1e-3);
             }
         }
-        assert!(mismatches < 10, "{mismatches} of 36,000");
+        assert!(drawn > 2500 * points().len(), "{wall:?}: only {drawn} samples");
+        assert!(mismatches < 10, "{mismatches} of {drawn}");
     }
 }
 
@@ -162,12 +157,17 @@ fn check_irradiance(wall: Wall, largest: f64) {
         };
         let by_direction = |s: LightSample| value(&s, lights.pdf_sample_direction(&x, &s));
         let single = estimate(20_000, || lights.sample(&x, pcg.cube()).map_or(0.0, by_direction));
-        let split = estimate(if wall == Wall::Nested { 0 } else { 20_000 }, || {
-            let mut samples = SmallVec::<[LightSample; 16]>::new();
-            lights.sample_split(&x, pcg.cube(), &splitting, &mut samples);
-            samples.iter().map(|s| value(s, s.pdf)).sum()
-        });
-        for (mean, error) in [single, split].into_iter().filter(|(mean, _)| mean.is_finite()) {
+        let mut estimates = vec![single];
+        // The density of a split sample is that of its point: no estimator where openings overlap.
+        if wall != Wall::Nested {
+            estimates.push(estimate(20_000, || {
+                let mut samples = SmallVec::<[LightSample; 16]>::new();
+                lights.sample_split(&x, pcg.cube(), &splitting, &mut samples);
+                samples.iter().map(|s| value(s, s.pdf)).sum()
+            }));
+        }
+        assert!(exact > 0.0, "{x:?} is dark");
+        for (mean, error) in estimates {
             let bound = 4.0 * (error * error + exact_error * exact_error).sqrt();
             assert!((mean - exact).abs() < bound, "{x:?}: {mean} ± {error}, {exact} ± {exact_error}");
         }
@@ -209,15 +209,18 @@ fn split_samples_have_the_density_that_pdf_split_finds() {
     let lights = Wall::Window.build();
     let mut pcg = Pcg32::new(4, 31);
     let splitting = Splitting::default();
+    let mut drawn = 0;
     for x in points() {
         for _ in 0..500 {
             let mut samples = SmallVec::<[LightSample; 16]>::new();
             lights.sample_split(&x, pcg.cube(), &splitting, &mut samples);
             for sample in samples {
+                drawn += 1;
                 let hit: Hit = sample.hit;
                 let again = lights.pdf_split(&x, &hit, &splitting);
                 assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{again} {}", sample.pdf);
             }
         }
     }
+    assert!(drawn > 400 * points().len(), "only {drawn} samples");
 }

@@ -8,3 +8,4 @@ pub(crate) mod parallel;
 pub(crate) mod pcg;
 pub(crate) mod scene;
 pub(crate) mod statistics;
+pub(crate) mod tier;

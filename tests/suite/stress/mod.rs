@@ -1,6 +1,6 @@
 //! Hostile scenes, seen from hostile points: no panic, no NaN, and how large the errors become.
 //!
-//! `cargo test --release --test stress -- --ignored --nocapture table` prints the table of `docs/STABILITY.md`.
+//! `cargo test --release --test suite -- --ignored --nocapture table` prints the table of `docs/STABILITY.md`.
 
 mod columns;
 mod estimate;

@@ -88,7 +88,7 @@ fn naive(ends: &[f64], mut u: f32) -> usize {
 }
 
 #[test]
-#[ignore = "release tier: a tree of 10^6 triangles; cargo test --release --test stress -- --ignored leaves"]
+#[ignore = "release tier: a tree of 10^6 triangles; cargo test --release --test suite -- --ignored leaves"]
 fn leaves_of_a_large_tree_are_chosen_with_their_probability() {
     let mut pcg = Pcg32::new(5, 66);
     let count = 1_000_000;
