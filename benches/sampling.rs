@@ -3,39 +3,32 @@
 //! `cloud-N` is `N` small triangles at random in the unit cube, each a mesh with a radiance of its own; the shading
 //! points lie in and around the cube. `batch` runs 10,000,000 triangles as well if `FANLIGHT_LARGE` is set.
 
+#[path = "instruction_set.rs"]
+mod instruction_set;
+
 use core::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use fanlight::{Environment, EnvironmentImage, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight};
-use glam::{DVec3, Vec3};
+use fanlight::{
+    Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight, sphere_to_square, square_to_sphere,
+};
+use glam::{DVec3, Vec2, Vec3};
+use rand_pcg::rand_core::Rng;
 
 /// Shading points, and vectors of random numbers, that are gone through in a circle.
 const POINTS: usize = 1 << 16;
 
 /// PCG32 (O'Neill 2014), XSH-RR 64/32.
-struct Pcg {
-    state: u64,
-    increment: u64,
-}
+struct Pcg(rand_pcg::Pcg32);
 
 impl Pcg {
     fn new(seed: u64, sequence: u64) -> Self {
-        let mut pcg = Self { state: 0, increment: (sequence << 1) | 1 };
-        pcg.next_u32();
-        pcg.state = pcg.state.wrapping_add(seed);
-        pcg.next_u32();
-        pcg
-    }
-
-    fn next_u32(&mut self) -> u32 {
-        let old = self.state;
-        self.state = old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(self.increment);
-        ((((old >> 18) ^ old) >> 27) as u32).rotate_right((old >> 59) as u32)
+        Self(rand_pcg::Pcg32::new(seed, sequence))
     }
 
     /// Uniform in `[0, 1)`.
     fn f(&mut self) -> f64 {
-        f64::from(self.next_u32() >> 8) / 16_777_216.0
+        f64::from(self.0.next_u32() >> 8) / 16_777_216.0
     }
 
     fn vector(&mut self) -> DVec3 {
@@ -161,8 +154,7 @@ fn environment(criterion: &mut Criterion) {
         if direction.dot(sun) > 0.5_f32.to_radians().cos() { 20_000.0 } else { 0.2 + 0.8 * cos.max(0.0) }
     };
     let sky: Vec<f32> = (0..2048 * SIZE).map(texel).collect();
-    let sky = EnvironmentImage::lat_long(2048, SIZE, &sky).filter(Filter::Nearest).resolution(SIZE);
-    let sky = Environment::new(&sky).expect("a valid sky");
+    let sky = Environment::from_lat_long_with_size(2048, SIZE, &sky, Filter::Nearest, SIZE).expect("a valid sky");
     let numbers = numbers();
     let mut pcg = Pcg::new(4, 4);
     let directions: Vec<Vec3> = (0..POINTS).map(|_| pcg.direction()).collect();
@@ -171,9 +163,25 @@ fn environment(criterion: &mut Criterion) {
     group.bench_function("pdf", |b| in_circle(b, POINTS, |i| sky.pdf(directions[i])));
     group.bench_function("sample", |b| in_circle(b, POINTS, |i| sky.sample([numbers[i][0], numbers[i][1]])));
     group.finish();
+
+    let squares: Vec<Vec2> = numbers.iter().map(|u| Vec2::new(u[0], u[1])).collect();
+    let mut group = criterion.benchmark_group("map");
+    group.bench_function("to sphere", |b| in_circle(b, POINTS, |i| square_to_sphere(squares[i])));
+    group.bench_function("to square", |b| in_circle(b, POINTS, |i| sphere_to_square(directions[i])));
+    group.finish();
+
+    let view = sky.as_view();
+    let mut group = criterion.benchmark_group("pyramid");
+    for sin_radius in [0.001, 0.03, 0.5] {
+        group.bench_function(BenchmarkId::new("look-up of a cone", sin_radius), |b| {
+            in_circle(b, POINTS, |i| view.radiance_of_cone(directions[i], sin_radius));
+        });
+    }
+    group.finish();
 }
 
 fn main() {
+    println!("times with the instructions {}", instruction_set::name());
     let mut criterion = Criterion::default().configure_from_args();
     environment(&mut criterion);
     lights(&mut criterion);

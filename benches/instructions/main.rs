@@ -53,7 +53,7 @@ fn run() -> Result<ExitCode, Error> {
     }
     let counts: Counts =
         cases::ALL.iter().map(|case| Ok((case.name.to_owned(), count(case)?))).collect::<Result<_, Error>>()?;
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/instructions/baseline.txt");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("instructions/baseline.txt");
     if words.iter().any(|word| word == "--update") {
         let lines: String = counts.iter().map(|(name, count)| format!("{name} {count}\n")).collect();
         std::fs::write(&path, lines)?;

@@ -109,6 +109,11 @@ impl Results {
             workload: String::new(),
             method: String::new(),
             class,
+            points: if self.measured.is_empty() {
+                self.selections.iter().filter(|point| wanted(point.class)).count()
+            } else {
+                self.measured.iter().filter(|point| wanted(point.class)).count()
+            },
             relvar: relvar.map(|(summary, ..)| summary),
             selection: selection.map(|(summary, _)| summary),
             lost: [relvar.map(|(.., lost)| lost), selection.map(|(_, lost)| lost)]
@@ -116,7 +121,7 @@ impl Results {
                 .flatten()
                 .reduce(f64::max),
             zero_rate: relvar.map(|(_, zeros, _)| zeros),
-            nanoseconds: timing::Nanoseconds { sample: 0.0, pdf: 0.0 },
+            nanoseconds: timing::Nanoseconds { lit: 0.0, all: 0.0, pdf: 0.0 },
             bytes: 0,
             build_ms: 0.0,
         })

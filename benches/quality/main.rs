@@ -11,6 +11,8 @@
 mod args;
 mod comparison;
 mod fairness;
+#[path = "../instruction_set.rs"]
+mod instruction_set;
 mod methods;
 mod metrics;
 mod oracle;

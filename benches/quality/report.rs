@@ -2,6 +2,7 @@
 
 use core::fmt::Write as _;
 
+use crate::instruction_set;
 use crate::metrics::Summary;
 use crate::timing::Nanoseconds;
 
@@ -11,6 +12,8 @@ pub(crate) struct Row {
     pub(crate) workload: String,
     pub(crate) method: String,
     pub(crate) class: &'static str,
+    /// Points of the class: of few, a summary says little.
+    pub(crate) points: usize,
     pub(crate) relvar: Option<Summary>,
     pub(crate) selection: Option<Summary>,
     /// Largest share of a point's light that has a probability of zero, by triangles or by samples of a reference.
@@ -24,7 +27,7 @@ pub(crate) struct Row {
 impl Row {
     /// Precision that a second of sampling buys: `1 / (relvar seconds)`.
     fn efficiency(&self, relvar: impl Fn(&Summary) -> f64) -> Option<f64> {
-        self.relvar.map(|summary| 1e9 / (relvar(&summary) * self.nanoseconds.sample))
+        self.relvar.map(|summary| 1e9 / (relvar(&summary) * self.nanoseconds.lit))
     }
 }
 
@@ -40,13 +43,15 @@ pub(crate) fn short(value: f64) -> String {
     }
 }
 
-/// Prints the head of the table.
+/// Prints the head of the table. Times are those of whole calls, at lit points and at all.
 pub(crate) fn print_head() {
+    println!("times with the instructions {}", instruction_set::name());
     println!(
-        "{:12} {:29} {:6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>6} {:>7} {:>7} {:>9} {:>8} {:>8}",
+        "{:12} {:29} {:6} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>6} {:>7} {:>7} {:>7} {:>9} {:>8} {:>8}",
         "workload",
         "method",
         "class",
+        "points",
         "relvar",
         "p90",
         "EW",
@@ -54,7 +59,8 @@ pub(crate) fn print_head() {
         "EW",
         "lost",
         "zero",
-        "ns",
+        "ns lit",
+        "ns all",
         "ns pdf",
         "bytes",
         "build ms",
@@ -68,10 +74,11 @@ pub(crate) fn print(row: &Row) {
     let relvar = |get: fn(&Summary) -> f64| figure(row.relvar.as_ref().map(get));
     let selection = |get: fn(&Summary) -> f64| figure(row.selection.as_ref().map(get));
     println!(
-        "{:12} {:29} {:6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>6} {:>7} {:>7} {:>9} {:>8} {:>8}",
+        "{:12} {:29} {:6} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>6} {:>7} {:>7} {:>7} {:>9} {:>8} {:>8}",
         row.workload,
         row.method,
         row.class,
+        row.points,
         relvar(|s| s.median),
         relvar(|s| s.p90),
         relvar(|s| s.energy_weighted),
@@ -79,7 +86,8 @@ pub(crate) fn print(row: &Row) {
         selection(|s| s.energy_weighted),
         figure(row.lost),
         figure(row.zero_rate),
-        short(row.nanoseconds.sample),
+        short(row.nanoseconds.lit),
+        short(row.nanoseconds.all),
         short(row.nanoseconds.pdf),
         row.bytes,
         short(row.build_ms),
@@ -107,13 +115,15 @@ fn object(row: &Row) -> String {
     let mut out =
         format!("  {{\"workload\": \"{}\", \"method\": \"{}\", \"class\": \"{}\"", row.workload, row.method, row.class);
     let figures = [
+        ("points", Some(row.points as f64)),
         ("relvar_median", row.relvar.map(|s| s.median)),
         ("relvar_p90", row.relvar.map(|s| s.p90)),
         ("relvar_ew", row.relvar.map(|s| s.energy_weighted)),
         ("exact_sel_median", row.selection.map(|s| s.median)),
         ("exact_sel_ew", row.selection.map(|s| s.energy_weighted)),
         ("zero_rate", row.zero_rate),
-        ("ns_sample", Some(row.nanoseconds.sample)),
+        ("ns_lit", Some(row.nanoseconds.lit)),
+        ("ns_all", Some(row.nanoseconds.all)),
         ("ns_pdf", Some(row.nanoseconds.pdf)),
         ("bytes", Some(row.bytes as f64)),
         ("build_ms", Some(row.build_ms)),

@@ -11,20 +11,28 @@ use crate::methods::{Drawn, Method};
 use crate::scenes::Scene;
 use crate::scenes::pcg::Pcg32;
 
-/// Nanoseconds a sample and a density.
+/// Nanoseconds a call and a density. A call is all that a host does for one light sample: see [`Method::call`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nanoseconds {
-    pub(crate) sample: f64,
+    /// A call at a point that light can arrive at: the time that belongs to the variance.
+    pub(crate) lit: f64,
+    /// A call at any point, many of which are dark and return early.
+    pub(crate) all: f64,
     pub(crate) pdf: f64,
 }
+
+/// A point, and random numbers for it.
+type Input = (ShadingPoint, [f32; 3]);
 
 /// The calls of one method.
 struct Calls<'a> {
     method: &'a dyn Method,
-    count: usize,
+    /// At lit points, and at all.
+    inputs: [&'a [Input]; 2],
     /// Points, each with a direction that the method drew there.
     drawn: Vec<(ShadingPoint, Drawn)>,
-    samples: Vec<f64>,
+    /// At lit points, and at all.
+    calls: [Vec<f64>; 2],
     pdfs: Vec<f64>,
 }
 
@@ -32,30 +40,41 @@ struct Calls<'a> {
 pub(crate) fn time(scene: &Scene, methods: &[Box<dyn Method + '_>], effort: &Effort) -> Vec<Nanoseconds> {
     let points = scene.points.timing(effort.calls);
     let mut pcg = Pcg32::new(3, 3);
-    let inputs: Vec<(ShadingPoint, [f32; 3])> = points.into_iter().map(|x| (x, pcg.uniform3())).collect();
-    let mut calls: Vec<Calls<'_>> = methods.iter().map(|method| Calls::new(method.as_ref(), &inputs)).collect();
+    let all: Vec<Input> = points.into_iter().map(|x| (x, pcg.uniform3())).collect();
+    let lit: Vec<Input> = all.iter().copied().filter(|(x, _)| scene.is_lit(x)).collect();
+    assert!(!lit.is_empty(), "no point is lit");
+    let mut calls: Vec<Calls<'_>> =
+        methods.iter().map(|method| Calls::new(method.as_ref(), [lit.as_slice(), all.as_slice()])).collect();
     for _ in 0..effort.repeats {
-        calls.iter_mut().for_each(|calls| calls.repeat(&inputs));
+        calls.iter_mut().for_each(Calls::repeat);
     }
-    calls.into_iter().map(|calls| Nanoseconds { sample: median(calls.samples), pdf: median(calls.pdfs) }).collect()
+    calls.into_iter().map(Calls::medians).collect()
 }
 
 impl<'a> Calls<'a> {
-    fn new(method: &'a dyn Method, inputs: &[(ShadingPoint, [f32; 3])]) -> Self {
+    fn new(method: &'a dyn Method, inputs: [&'a [Input]; 2]) -> Self {
         // A method that looks at every light needs few calls to be timed.
-        let count = if method.is_slow() { inputs.len().div_ceil(64) } else { inputs.len() };
-        let drawn = inputs[..count].iter().filter_map(|(x, u)| method.sample(x, *u).map(|drawn| (*x, drawn))).collect();
-        Self { method, count, drawn, samples: vec![], pdfs: vec![] }
+        let few = |inputs: &'a [Input]| if method.is_slow() { &inputs[..inputs.len().div_ceil(64)] } else { inputs };
+        let inputs = inputs.map(few);
+        let drawn = inputs[1].iter().filter_map(|(x, u)| method.sample(x, *u).map(|drawn| (*x, drawn))).collect();
+        Self { method, inputs, drawn, calls: [vec![], vec![]], pdfs: vec![] }
     }
 
-    fn repeat(&mut self, inputs: &[(ShadingPoint, [f32; 3])]) {
+    fn repeat(&mut self) {
         let method = black_box(self.method);
-        self.samples.push(nanoseconds(&inputs[..self.count], |(x, u)| {
-            black_box(method.sample(x, *u));
-        }));
+        for (times, inputs) in self.calls.iter_mut().zip(self.inputs) {
+            times.push(nanoseconds(inputs, |(x, u)| {
+                black_box(method.call(x, *u));
+            }));
+        }
         self.pdfs.push(nanoseconds(&self.drawn, |(x, drawn)| {
             black_box(method.pdf(x, drawn));
         }));
+    }
+
+    fn medians(self) -> Nanoseconds {
+        let [lit, all] = self.calls.map(median);
+        Nanoseconds { lit, all, pdf: median(self.pdfs) }
     }
 }
 

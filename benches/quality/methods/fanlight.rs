@@ -66,6 +66,15 @@ impl<const N: usize> Method for Fanlight<'_, N> {
         Some(self.drawn(&sample, pdf))
     }
 
+    /// For emitters `at` and `sample`; for portals, whatever their layers, the density of the direction as well.
+    #[inline]
+    fn call(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<f64> {
+        let here = self.sampler.at(x);
+        let sample = here.sample(u)?;
+        let pdf = if self.scene.sky.is_some() { here.pdf_sample_direction(&sample) } else { sample.pdf };
+        Some(f64::from(pdf))
+    }
+
     #[inline]
     fn pdf(&self, x: &ShadingPoint, drawn: &Drawn) -> f64 {
         if self.layered {

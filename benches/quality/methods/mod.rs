@@ -44,6 +44,12 @@ pub(crate) trait Method: Sync {
     /// Draws a direction.
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn>;
 
+    /// All that a host does at a point for one light sample: the density that its estimate is divided by. A method whose
+    /// samples come with that density needs no more than [`Self::sample`].
+    fn call(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<f64> {
+        self.sample(x, u).map(|drawn| drawn.pdf)
+    }
+
     /// Density per solid angle of what a method drew, found anew.
     fn pdf(&self, x: &ShadingPoint, drawn: &Drawn) -> f64;
 

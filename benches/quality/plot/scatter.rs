@@ -7,7 +7,7 @@ use crate::Failure;
 use crate::report::Row;
 use crate::scenes::workload_and_variant;
 
-const LABELS: [&str; 2] = ["ns a sample", "relative variance (EW)"];
+const LABELS: [&str; 2] = ["ns a call at a lit point", "relative variance (EW)"];
 
 /// Draws the emitters' workloads into one picture of a directory, those with portals into another.
 pub(crate) fn draw(directory: &Path, rows: &[Row]) -> Result<(), Failure> {
@@ -42,7 +42,7 @@ fn panels(rows: &[&Row]) -> Vec<Panel> {
             panels.push(Panel { title, series: vec![] });
             panels.len() - 1
         });
-        let marks = vec![(row.nanoseconds.sample, relvar.energy_weighted)];
+        let marks = vec![(row.nanoseconds.lit, relvar.energy_weighted)];
         let (method, variant) = workload_and_variant(&row.method);
         panels[at].series.push(Series { name: method.to_owned(), open: variant.is_some(), marks });
     }

@@ -10,7 +10,7 @@ pub(crate) mod sky;
 pub(crate) mod sphere;
 pub(crate) mod wall;
 
-use fanlight::{Filter, TriangleId};
+use fanlight::{Filter, ShadingPoint, TriangleId};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use image::Image;
@@ -173,6 +173,29 @@ impl Scene {
     pub(crate) fn transmittance(&self, x: DVec3, direction: DVec3) -> f64 {
         let through = |wall: &Wall| wall.meet(x, direction, self.image.as_ref()).map_or(0.0, |(_, t)| t);
         self.walls.iter().filter(|wall| wall.y > x.y).map(through).product()
+    }
+
+    /// Whether anything can arrive at a point: whether some light faces it, and is not black and not below the horizon
+    /// everywhere. The places of a light that are looked at are its corners, where its whole area sends, or a grid.
+    pub(crate) fn is_lit(&self, x: &ShadingPoint) -> bool {
+        const GRID: usize = 16;
+        let eye = x.position.as_dvec3();
+        let is_whole = self.image.is_none() && self.walls.len() < 2;
+        let grid = || (0..=GRID).flat_map(|i| (0..=GRID - i).map(move |j| [i, j].map(|k| k as f64 / GRID as f64)));
+        let sends = |l: usize, b: [f64; 2]| {
+            let direction = self.lights[l].point(b) - eye;
+            let is_sent = is_whole
+                || if self.sky.is_some() { self.transmittance(eye, direction) > 0.0 } else { self.weight(l, b) > 0.0 };
+            is_sent && x.cosine(direction.as_vec3()) > 0.0
+        };
+        let faces = |l: usize| {
+            let [a, b, c] = self.lights[l].vertices;
+            (b - a).cross(c - a).dot(eye - a) > 0.0
+        };
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let lit =
+            |l: usize| if is_whole { corners.into_iter().any(|b| sends(l, b)) } else { grid().any(|b| sends(l, b)) };
+        (0..self.lights.len()).any(|l| faces(l) && lit(l))
     }
 
     /// Mean radiance or transmittance of a light.

@@ -3,30 +3,21 @@
 use core::f64::consts::TAU;
 
 use glam::DVec3;
+use rand_pcg::rand_core::Rng;
 
 /// PCG32, XSH-RR 64/32 (O'Neill 2014, "PCG: A Family of Simple Fast Space-Efficient Statistically Good Algorithms
-/// for Random Number Generation").
-pub(crate) struct Pcg32 {
-    state: u64,
-    increment: u64,
-}
+/// for Random Number Generation"), with what the workloads draw from it.
+pub(crate) struct Pcg32(rand_pcg::Pcg32);
 
 impl Pcg32 {
-    /// A generator in its reference initialisation.
+    /// A generator in its reference initialization.
     pub(crate) fn new(seed: u64, sequence: u64) -> Self {
-        let mut pcg = Self { state: 0, increment: (sequence << 1) | 1 };
-        pcg.bits();
-        pcg.state = pcg.state.wrapping_add(seed);
-        pcg.bits();
-        pcg
+        Self(rand_pcg::Pcg32::new(seed, sequence))
     }
 
     /// 32 random bits.
     pub(crate) fn bits(&mut self) -> u32 {
-        let old = self.state;
-        self.state = old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(self.increment);
-        let xorshifted = (((old >> 18) ^ old) >> 27) as u32;
-        xorshifted.rotate_right((old >> 59) as u32)
+        self.0.next_u32()
     }
 
     /// Uniform in `[0, 1)`, a multiple of 2^-24.

@@ -1,7 +1,7 @@
 //! What must hold for any bytes at all. The fuzz targets call it with theirs, the tests with those that once failed.
 
-mod build;
-mod reader;
+pub(crate) mod build;
+pub(crate) mod reader;
 
 use fanlight::{LightSample, LightSampler, LightSamplerView, Receiver, ShadingPoint, Splitting};
 use glam::Vec3;

@@ -1,0 +1,65 @@
+//! How much the statistical tests do.
+//!
+//! `cargo test` does little of everything; `FANLIGHT_TIER=full cargo test --release --test suite -- --include-ignored` does
+//! what is behind the figures of the documentation. No tolerance depends on the tier.
+
+use std::sync::OnceLock;
+
+/// The sizes of one tier.
+pub(crate) struct Tier {
+    /// Scenes of which samples are looked up again, and samples of each.
+    pub(crate) agreement: [usize; 2],
+    /// Shading points of a family of scenes whose irradiance is estimated.
+    pub(crate) points: usize,
+    /// Cases of a property.
+    pub(crate) cases: u32,
+    /// Samples of a histogram over the cells of triangles.
+    pub(crate) histogram: usize,
+    /// One of so many scenes and points of a family is looked at, where all together take long.
+    pub(crate) stride: usize,
+    /// Inputs of random bytes.
+    pub(crate) inputs: u64,
+    /// Triangles of a large build.
+    pub(crate) triangles: u32,
+    /// Edges of images that are repeated, in texels.
+    pub(crate) tiles: &'static [usize],
+}
+
+const FULL: Tier = Tier {
+    agreement: [400, 25_000],
+    points: 20,
+    cases: 400,
+    histogram: 100_000,
+    stride: 1,
+    inputs: 20_000,
+    triangles: 1_000_000,
+    tiles: &[16, 64, 256],
+};
+
+/// The stride has no factor in common with the periods in which the families of scenes vary.
+const THIN: Tier = Tier {
+    agreement: [200, 1000],
+    points: 8,
+    cases: 50,
+    histogram: 30_000,
+    stride: 5,
+    inputs: 2000,
+    triangles: 200_000,
+    tiles: &[16, 64],
+};
+
+/// The tier that the environment variable `FANLIGHT_TIER` asks for.
+pub(crate) fn tier() -> &'static Tier {
+    static IS_FULL: OnceLock<bool> = OnceLock::new();
+    let is_full = IS_FULL.get_or_init(|| match std::env::var("FANLIGHT_TIER").as_deref() {
+        Ok("full") => true,
+        Ok("thin") | Err(_) => false,
+        Ok(other) => panic!("FANLIGHT_TIER is `full` or `thin`, not `{other}`"),
+    });
+    if *is_full { &FULL } else { &THIN }
+}
+
+/// Numbers below `count`: all of them, or one of so many.
+pub(crate) fn some(count: usize) -> Vec<usize> {
+    (0..count).step_by(tier().stride).collect()
+}

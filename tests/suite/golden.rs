@@ -1,0 +1,103 @@
+//! The bits of samples and densities at fixed seeds: whoever changes one should have meant to.
+//!
+//! `GOLDEN=write cargo test golden` writes down what is found. Angles come from the system's library of functions
+//! or, without `std`, from `libm`, so that there is a list for each, and they hold for the system that they were made on.
+use std::path::Path;
+
+use crate::common::hostile::{random_scene, shading_point};
+use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::Scene;
+use fanlight::{LightSample, ShadingPoint, Splitting, TriangleId};
+
+const SCENES: usize = 70;
+const POINTS: usize = 60;
+
+const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
+
+/// FNV-1a over the bits of numbers.
+struct Hash(u64);
+
+impl Hash {
+    fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    fn add(&mut self, values: &[f32]) {
+        for byte in values.iter().flat_map(|value| value.to_bits().to_le_bytes()) {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+        }
+    }
+
+    fn add_sample(&mut self, sample: &LightSample) {
+        let id = sample.hit.triangle;
+        self.add(&[f32::from_bits(id.mesh), f32::from_bits(id.triangle)]);
+        self.add(&sample.hit.barycentrics);
+        [sample.position, sample.normal, sample.direction].iter().for_each(|v| self.add(&v.to_array()));
+        self.add(&[sample.distance, sample.pdf, sample.pdf_area, sample.pmf]);
+    }
+}
+
+/// What is asked at one point; the number of samples that were drawn.
+fn ask(lights: &dyn Lights, x: &ShadingPoint, pcg: &mut Pcg32, hash: &mut Hash) -> usize {
+    let at = lights.at(x);
+    let splitting = Splitting { threshold: 0.7, levels: 2 };
+    let u = pcg.cube();
+    let split = lights.sample_split(x, u, &splitting);
+    let single = at.sample(u);
+    for sample in single.iter().chain(split.iter().take(8)) {
+        hash.add_sample(sample);
+        hash.add(&[at.pdf(&sample.hit), at.pmf(sample.hit.triangle), lights.pdf_split(x, &sample.hit, &splitting)]);
+        hash.add(&[at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
+    }
+    hash.add(&[at.pdf_direction(pcg.direction()), at.pmf(TriangleId { mesh: 0, triangle: 0 })]);
+    usize::from(single.is_some()) + split.len()
+}
+
+/// The environment's own samples.
+fn ask_environment(scene: &Scene, pcg: &mut Pcg32, hash: &mut Hash) {
+    let environment = scene.environment();
+    for _ in 0..POINTS {
+        if let Some(sample) = environment.sample([pcg.f32(), pcg.f32()]) {
+            hash.add(&sample.direction.to_array());
+            hash.add(&[sample.pdf, sample.radiance, environment.pdf(sample.direction)]);
+        }
+    }
+}
+
+/// One line about one scene.
+fn line(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 81);
+    let scene = random_scene(number, &mut pcg);
+    let (n, m) = ARITIES[number % ARITIES.len()];
+    let lights = build(&scene, (n, m));
+    let mut hash = Hash::new();
+    let mut drawn = 0;
+    let points: Vec<_> = (0..POINTS).map(|i| shading_point(number + i, &scene, &mut pcg)).collect();
+    for x in &points {
+        drawn += ask(&*lights, x, &mut pcg, &mut hash);
+    }
+    let queries: Vec<_> = points.iter().map(|x| (*x, pcg.cube())).collect();
+    lights.sample_from_bytes(&queries).iter().flatten().for_each(|sample| hash.add_sample(sample));
+    ask_environment(&scene, &mut pcg, &mut hash);
+    format!("{number:2} {n:2}/{m:2} {drawn:5} {:016x} {}\n", hash.0, scene.name)
+}
+
+fn all() -> String {
+    parallel::map(SCENES, line).concat()
+}
+
+#[test]
+fn samples_and_densities_are_those_of_before() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(LIST);
+    let found = all();
+    if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {
+        std::fs::write(&path, found).expect("the list can be written");
+        panic!("{} is written, and nothing was compared", path.display());
+    }
+    let known = std::fs::read_to_string(&path).expect("the list can be read");
+    let differing: Vec<_> = found.lines().zip(known.lines()).filter(|(found, known)| found != known).collect();
+    assert!(differing.is_empty(), "found and known: {differing:#?}");
+    assert_eq!(found.lines().count(), known.lines().count());
+}

@@ -1,0 +1,28 @@
+//! All acceptance tests, in one binary. They know the crate by its public interface alone.
+//!
+//! `cargo test NAME` runs a module or a test: `cargo test golden`, `cargo test layering`. Sizes are in [`common::tier`].
+
+// Shared with the fuzz targets.
+#[path = "../fuzz/checks/mod.rs"]
+mod checks;
+mod common;
+
+mod agreement;
+mod build;
+mod chi_square;
+mod double_check;
+mod emission;
+mod errors;
+mod fuzz_regressions;
+#[cfg(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))]
+mod golden;
+mod invariance;
+mod irradiance;
+mod layering;
+mod memory;
+mod normalisation;
+mod procedural;
+mod properties;
+mod refit;
+mod stress;
+mod suns;

@@ -1,0 +1,226 @@
+//! For every shading point, the density of all points of all triangles integrates to the probability that `sample`
+//! returns one.
+
+use crate::common::density::{OnTriangle, id, probes};
+use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::{Content, Scene, random_point};
+use crate::common::statistics::{binomial_p, sidak};
+use crate::common::tier::{some, tier};
+use fanlight::{Hit, LightSample, ShadingPoint};
+use glam::Vec3;
+
+/// Error granted to an integral.
+const TOLERANCE: f64 = 1e-4;
+/// Significance of all scenes together.
+const SIGNIFICANCE: f64 = 0.01;
+/// Triangles that together have less probability than this are left out.
+const NEGLIGIBLE: f64 = 2e-5;
+
+struct Found {
+    name: String,
+    integral: f64,
+    unresolved: f64,
+    samples: usize,
+    missed: usize,
+}
+
+/// Integral of the density over all triangles, and the most that it can be wrong by where the density varies over
+/// less than the integration resolves.
+fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[LightSample], wrong: bool) -> (f64, f64) {
+    let count = scene.triangles().count();
+    // The more probable a triangle, the finer what may be missed in it.
+    let least_depth = |pmf: f64| match pmf {
+        pmf if pmf > 0.05 => 6,
+        pmf if pmf < 1e-3 && count >= 1000 => 2,
+        _ => 4,
+    };
+    let probes = probes(scene, samples);
+    let pdf = |hit: &Hit| {
+        let factor = if wrong && hit.barycentrics[0] > 0.5 { 1.1 } else { 1.0 };
+        factor * f64::from(lights.pdf(x, hit))
+    };
+    let mut triangles: Vec<_> = scene.triangles().map(|t| (f64::from(lights.pmf(x, id(t))), t)).collect();
+    triangles.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut left: f64 = triangles.iter().map(|t| t.0).sum();
+    assert!(left <= 1.0 + 1e-5, "{}: the triangles' probabilities add up to {left}", scene.name);
+    let (mut sum, mut unresolved) = (0.0, 0.0);
+    for (pmf, triangle) in triangles {
+        if left < NEGLIGIBLE {
+            break;
+        }
+        left -= pmf;
+        let on = OnTriangle::new(scene, triangle, x, &pdf);
+        let (whole, open) = on.integrate(0, least_depth(pmf), &probes[triangle.0][triangle.1]);
+        sum += whole[0];
+        unresolved += open;
+    }
+    (sum, unresolved)
+}
+
+fn examine(content: Content, number: usize, receiver: usize, count: usize, wrong: bool) -> Found {
+    examine_moved(content, number, receiver, count, wrong, &|p| p)
+}
+
+/// [`examine`] with all positions changed.
+fn examine_moved(
+    content: Content,
+    number: usize,
+    receiver: usize,
+    count: usize,
+    wrong: bool,
+    change: &dyn Fn(Vec3) -> Vec3,
+) -> Found {
+    let mut pcg = Pcg32::new(100 + number as u64, 11);
+    let mut scene = Scene::random(&mut pcg, content);
+    scene.meshes.iter_mut().for_each(|mesh| mesh.positions.iter_mut().for_each(|p| *p = change(*p)));
+    let arities = ARITIES[number % ARITIES.len()];
+    let lights = build(&scene, arities);
+    let mut x = random_point(&mut pcg, receiver);
+    x.position = change(x.position);
+    let samples: Vec<_> = (0..count).filter_map(|_| lights.sample(&x, pcg.cube())).collect();
+    let probing = &samples[..samples.len().min(2000)];
+    let (integral, unresolved) = integral(&scene, &*lights, &x, probing, wrong);
+    let name = format!("{} {arities:?} {:?} {x:?}", scene.name, scene.illumination);
+    Found { name, integral, unresolved, samples: count, missed: count - samples.len() }
+}
+
+/// Sizes with every texturing and sky; the largest with some. Many textured triangles take long to integrate over, so
+/// that they are left to the release tier.
+fn contents(two_sided: bool, slow: bool) -> Vec<Content> {
+    let mut contents = Vec::new();
+    for triangles in [1, 2, 10, 100] {
+        for textured in [false, true] {
+            contents.extend((0..4).map(|sky| Content { triangles, textured, sky, two_sided }));
+        }
+    }
+    contents.extend((0..4).map(|sky| Content { triangles: 1000, textured: sky % 2 == 0, sky, two_sided }));
+    contents.push(Content { triangles: 10_000, textured: false, sky: 0, two_sided });
+    contents.retain(|content| slow == (content.textured && content.triangles > 2));
+    contents
+}
+
+/// Volumes see every two-sided light, and no sky without a black pixel hides one: nothing can be missed.
+fn check_where_all_is_visible(slow: bool) {
+    let contents: Vec<_> = contents(true, slow).into_iter().filter(|content| content.sky < 2).collect();
+    let found = parallel::map(contents.len(), |i| examine(contents[i], 1000 + i, 2, 5000, false));
+    let mut worst = 0.0f64;
+    for found in &found {
+        assert_eq!(found.missed, 0, "{}", found.name);
+        worst = worst.max((found.integral - 1.0).abs());
+        assert!((found.integral - 1.0).abs() < TOLERANCE, "{}: {}", found.name, found.integral);
+    }
+    println!("{} scenes, largest deviation {worst:e}", found.len());
+}
+
+#[test]
+fn where_all_is_visible_the_density_integrates_to_one() {
+    check_where_all_is_visible(false);
+}
+
+#[test]
+#[ignore = "release tier: minutes; cargo test --release --test suite -- normalisation --ignored"]
+fn where_all_is_visible_the_density_of_many_textures_integrates_to_one() {
+    check_where_all_is_visible(true);
+}
+
+/// The same far from the origin, tiny, huge, and squeezed to slivers.
+#[test]
+fn the_density_integrates_to_one_at_any_scale() {
+    let changes: [&(dyn Fn(Vec3) -> Vec3 + Sync); 6] = [
+        &|p| p + Vec3::new(1000.0, -2000.0, 500.0),
+        &|p| p * 1e-6,
+        &|p| p * 1e6,
+        &|p| p * Vec3::new(1.0, 1.0, 1e-3),
+        &|p| p * Vec3::new(1.0, 1e-4, 1e-4),
+        &|p| p * 1e-2 + 1000.0,
+    ];
+    let numbers = some(8 * changes.len());
+    let count = numbers.len();
+    let found = parallel::map(count, |k| {
+        let i = numbers[k];
+        let triangles = [1, 10][i % 2];
+        let content = Content { triangles, textured: i % 4 > 1, sky: i % 8 / 4, two_sided: true };
+        examine_moved(content, 2000 + i, 2, 5000, false, changes[i / 8])
+    });
+    for found in &found {
+        let deviation = (found.integral + found.missed as f64 / found.samples as f64 - 1.0).abs();
+        let tolerance = TOLERANCE + found.unresolved;
+        assert!(deviation < tolerance, "{}: {}, missed {}", found.name, found.integral, found.missed);
+    }
+    // A point next to a sliver sees densities that vary over less than the integration resolves.
+    let resolved = found.iter().filter(|found| found.unresolved < 0.1 * TOLERANCE).count();
+    println!("{resolved} of {count} scenes are resolved");
+    assert!(10 * resolved >= 9 * count, "only {resolved} of {count} scenes are resolved");
+}
+
+/// Everywhere else the shortfall is the rate of `None`. Each scene's binomial test has Šidák's share of 1 %. `ends` are
+/// how many points that always give a sample, and that never do, there must be to make this a test; of a part of the
+/// points, a part.
+fn check_elsewhere(slow: bool, ends: [usize; 2]) {
+    let contents = contents(false, slow);
+    let numbers = some(3 * contents.len());
+    let count = numbers.len();
+    let found = parallel::map(count, |k| {
+        let i = numbers[k];
+        examine(contents[i / 3], i / 3, i % 3, 40_000, false)
+    });
+    let significance = sidak(SIGNIFICANCE, count);
+    let (mut full, mut empty, mut least) = (0, 0, 1.0f64);
+    for found in &found {
+        let p = p_value(found);
+        assert!(
+            p > significance,
+            "{}: integral {}, missed {} of {}: p = {p:e}",
+            found.name,
+            found.integral,
+            found.missed,
+            found.samples
+        );
+        least = least.min(p);
+        full += usize::from(found.missed == 0);
+        empty += usize::from(found.missed == found.samples);
+        if found.missed == found.samples {
+            assert!(found.integral < TOLERANCE, "{}: {}", found.name, found.integral);
+        }
+    }
+    println!("{count} points: {full} always give a sample, {empty} never do; least p {least:e}");
+    // Both ends and the middle occur.
+    let [least_full, least_empty] = ends.map(|end| end / tier().stride);
+    let between = count - full - empty;
+    assert!(full > least_full && empty >= least_empty && between > 5 / tier().stride, "{full} {empty} {count}");
+}
+
+#[test]
+fn elsewhere_the_shortfall_is_the_rate_of_none() {
+    check_elsewhere(false, [10, 3]);
+}
+
+#[test]
+#[ignore = "release tier: minutes; cargo test --release --test suite -- normalisation --ignored"]
+fn elsewhere_the_shortfall_of_many_textures_is_the_rate_of_none() {
+    check_elsewhere(true, [5, 0]);
+}
+
+/// Probability of a rate of `None` at least as far from the shortfall, less the error granted to the integral.
+fn p_value(found: &Found) -> f64 {
+    let n = found.samples as f64;
+    let shortfall = 1.0 - found.integral;
+    if shortfall < -TOLERANCE {
+        return 0.0;
+    }
+    let rate = found.missed as f64 / n;
+    let nearest = rate.max(shortfall - TOLERANCE).min(shortfall + TOLERANCE).clamp(0.0, 1.0);
+    binomial_p(found.missed as f64, n, nearest)
+}
+
+/// The checks above see a density that is too large by a tenth on a quarter of a triangle.
+#[test]
+fn a_wrong_density_is_found() {
+    let content = Content { triangles: 10, textured: false, sky: 0, two_sided: true };
+    let right = examine(content, 1, 2, 40_000, false);
+    let wrong = examine(content, 1, 2, 40_000, true);
+    assert!((right.integral - 1.0).abs() < TOLERANCE && p_value(&right) > 0.5);
+    assert!((wrong.integral - 1.0).abs() > TOLERANCE && p_value(&wrong) < 1e-9, "{}", wrong.integral);
+}
