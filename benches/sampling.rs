@@ -99,20 +99,20 @@ fn lights(criterion: &mut Criterion) {
         let cloud = cloud(n);
         let sampler = build(&cloud);
         let mut group = criterion.benchmark_group(format!("cloud-{n}"));
-        group.bench_function("sample", |b| in_circle(b, POINTS, |i| sampler.sample(&points[i], numbers[i])));
+        group.bench_function("sample", |b| in_circle(b, POINTS, |i| sampler.at(&points[i]).sample(numbers[i])));
 
         // Densities of what was drawn: elsewhere they would be cheap zeros.
         let drawn: Vec<(ShadingPoint, Hit, Vec3)> = points
             .iter()
             .zip(&numbers)
-            .filter_map(|(x, u)| sampler.sample(x, *u).map(|sample| (*x, sample.hit, sample.direction)))
+            .filter_map(|(x, u)| sampler.at(x).sample(*u).map(|sample| (*x, sample.hit, sample.direction)))
             .collect();
         group.bench_function("pmf", |b| {
-            in_circle(b, drawn.len(), |i| sampler.pmf(&drawn[i].0, drawn[i].1.triangle));
+            in_circle(b, drawn.len(), |i| sampler.at(&drawn[i].0).pmf(drawn[i].1.triangle));
         });
-        group.bench_function("pdf", |b| in_circle(b, drawn.len(), |i| sampler.pdf(&drawn[i].0, &drawn[i].1)));
+        group.bench_function("pdf", |b| in_circle(b, drawn.len(), |i| sampler.at(&drawn[i].0).pdf(&drawn[i].1)));
         group.bench_function("pdf_direction", |b| {
-            in_circle(b, drawn.len(), |i| sampler.pdf_direction(&drawn[i].0, drawn[i].2));
+            in_circle(b, drawn.len(), |i| sampler.at(&drawn[i].0).pdf_direction(drawn[i].2));
         });
         group.finish();
     }
@@ -126,7 +126,7 @@ fn batch(criterion: &mut Criterion) {
         let sampler = build(&cloud(n));
         let mut group = criterion.benchmark_group(format!("batch/cloud-{n}"));
         group.throughput(Throughput::Elements(1));
-        group.bench_function("single", |b| in_circle(b, POINTS, |i| sampler.sample(&queries[i].0, queries[i].1)));
+        group.bench_function("single", |b| in_circle(b, POINTS, |i| sampler.at(&queries[i].0).sample(queries[i].1)));
         for size in [1, 2, 4, 8, 16] {
             let mut samples = [None; 16];
             let mut batches = queries.chunks_exact(size).cycle();

@@ -39,26 +39,30 @@ pub(crate) const ALL: &[Case] = &[
     Case {
         name: "cloud/pmf",
         calls: CALLS,
-        run: || of_samples("cloud-10000", |lights, x, s| lights.pmf(x, s.hit.triangle)),
+        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pmf(s.hit.triangle)),
     },
-    Case { name: "cloud/pdf", calls: CALLS, run: || of_samples("cloud-10000", |lights, x, s| lights.pdf(x, &s.hit)) },
+    Case {
+        name: "cloud/pdf",
+        calls: CALLS,
+        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pdf(&s.hit)),
+    },
     Case {
         name: "cloud/pdf_direction",
         calls: CALLS,
-        run: || of_samples("cloud-10000", |lights, x, s| lights.pdf_direction(x, s.direction)),
+        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pdf_direction(s.direction)),
     },
     Case { name: "cloud/sample_split", calls: CALLS, run: sample_split },
     Case { name: "cloud/nee", calls: CALLS, run: || next_event("cloud-10000") },
     Case { name: "cloud/build", calls: 1, run: build },
     Case { name: "quad/sample", calls: CALLS, run: || sample("quad") },
-    Case { name: "quad/pdf", calls: CALLS, run: || of_samples("quad", |lights, x, s| lights.pdf(x, &s.hit)) },
+    Case { name: "quad/pdf", calls: CALLS, run: || of_samples("quad", |lights, x, s| lights.at(x).pdf(&s.hit)) },
     Case { name: "quad/nee", calls: CALLS, run: || next_event("quad") },
     Case { name: "window/sample", calls: CALLS, run: || sample("window") },
-    Case { name: "window/pdf", calls: CALLS, run: || of_samples("window", |lights, x, s| lights.pdf(x, &s.hit)) },
+    Case { name: "window/pdf", calls: CALLS, run: || of_samples("window", |lights, x, s| lights.at(x).pdf(&s.hit)) },
     Case {
         name: "window/pdf_direction",
         calls: CALLS,
-        run: || of_samples("window", |lights, x, s| lights.pdf_direction(x, s.direction)),
+        run: || of_samples("window", |lights, x, s| lights.at(x).pdf_direction(s.direction)),
     },
     Case { name: "window/at", calls: CALLS, run: at },
     Case { name: "window/nee", calls: CALLS, run: || next_event("window") },
@@ -125,7 +129,7 @@ fn sample(workload: &str) {
     let scene = scenes::scene(workload);
     let (lights, points, numbers) = (lights(&scene), scene.points.timing(CALLS), numbers());
     measured(|i| {
-        black_box(lights.sample(&points[i], numbers[i]));
+        black_box(lights.at(&points[i]).sample(numbers[i]));
     });
 }
 
@@ -138,7 +142,7 @@ fn of_samples(workload: &str, density: fn(&LightSampler, &ShadingPoint, &LightSa
     let drawn: Vec<(ShadingPoint, LightSample)> = points
         .iter()
         .zip(numbers.iter().cycle())
-        .filter_map(|(x, u)| lights.sample(x, *u).map(|sample| (*x, sample)))
+        .filter_map(|(x, u)| lights.at(x).sample(*u).map(|sample| (*x, sample)))
         .collect();
     measured(|i| {
         black_box(density(&lights, &drawn[i].0, &drawn[i].1));
@@ -160,7 +164,7 @@ fn sample_split() {
 fn lit_points(scene: &Scene, lights: &LightSampler) -> Vec<ShadingPoint> {
     let mut pcg = Pcg32::new(4, 4);
     let points = scene.points.timing(16 * CALLS);
-    let lit = points.into_iter().filter(|x| (0..TRIES).any(|_| lights.sample(x, pcg.uniform3()).is_some()));
+    let lit = points.into_iter().filter(|x| (0..TRIES).any(|_| lights.at(x).sample(pcg.uniform3()).is_some()));
     let lit: Vec<_> = lit.take(CALLS).collect();
     assert_eq!(lit.len(), CALLS, "a workload has too few lit points");
     lit

@@ -6,6 +6,7 @@ use super::ids::TriangleId;
 
 /// A point on a light triangle, as a host's own intersector reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Hit {
     /// The triangle that was hit.
     pub triangle: TriangleId,
@@ -13,8 +14,17 @@ pub struct Hit {
     pub barycentrics: [f32; 2],
 }
 
+impl Hit {
+    /// Returns the point of a triangle with these weights `[b1, b2]` of its second and third vertex.
+    #[must_use]
+    pub const fn new(triangle: TriangleId, barycentrics: [f32; 2]) -> Self {
+        Self { triangle, barycentrics }
+    }
+}
+
 /// A point on a light, drawn for a shading point.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LightSample {
     /// Where on the lights the point lies.
     pub hit: Hit,

@@ -1,12 +1,12 @@
 //! A density that `sample` reports is the density that is found for the same point later.
 
 use crate::common::hostile::{MOVED, hostile, random_scene, shading_point};
-use crate::common::lights::{ARITIES, Point, build};
+use crate::common::lights::{ARITIES, Point, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LightMesh, Paint, Scene, Sky, random_point};
 use crate::common::tier::{some, tier};
-use fanlight::{LightSample, Receiver, ShadingPoint, Splitting};
+use fanlight::{Arity, LightSample, Receiver, ShadingPoint, Splitting};
 use glam::Vec3;
 
 /// Largest relative difference of two densities of one point.
@@ -100,9 +100,9 @@ fn examine(number: usize, samples: usize, every: usize) -> Counts {
             let u = core::array::from_fn(|_| if direction { pcg.f32() } else { hostile(&mut pcg) });
             match at.sample(u) {
                 Some(sample) => {
-                    counts.check(&*at, &x, &sample);
+                    counts.check(&at, &x, &sample);
                     if direction {
-                        counts.check_direction(&*at, &x, &sample);
+                        counts.check_direction(&at, &x, &sample);
                     }
                 }
                 None => {
@@ -148,14 +148,14 @@ fn a_density_of_another_cell_is_told_apart() {
     let mut scene =
         Scene::random(&mut Pcg32::new(3, 16), Content { triangles: 10, textured: true, sky: 0, two_sided: true });
     scene.rotation = glam::Mat3::IDENTITY;
-    let lights = build(&scene, (8, 4));
+    let lights = build(&scene, Arity::Eight);
     let mut pcg = Pcg32::new(4, 16);
     let x = random_point(&mut pcg, 2);
     let mut counts = Counts::default();
     for _ in 0..1000 {
-        let mut sample = lights.sample(&x, pcg.cube()).expect("everything is visible");
+        let mut sample = lights.at(&x).sample(pcg.cube()).expect("everything is visible");
         sample.pdf *= 1.0 + 3e-5;
-        counts.check(&*lights.at(&x), &x, &sample);
+        counts.check(&lights.at(&x), &x, &sample);
     }
     assert_eq!(counts.mismatches, 1000);
 }
@@ -166,17 +166,17 @@ fn split_samples_have_the_density_that_pdf_split_finds() {
         let mut pcg = Pcg32::new(number as u64, 17);
         let scene = random_scene(number, &mut pcg);
         let lights = build(&scene, ARITIES[number % ARITIES.len()]);
-        let splitting = Splitting { threshold: [0.3, 0.7, 0.95, 1.0][number % 4], levels: 1 + (number % 3) as u32 };
+        let splitting = Splitting::new([0.3, 0.7, 0.95, 1.0][number % 4], 1 + (number % 3) as u32);
         let (mut count, mut most) = (0, 0);
         for point in 0..40 {
             let x = shading_point(number + point, &scene, &mut pcg);
             for _ in 0..20 {
                 let u = core::array::from_fn(|_| hostile(&mut pcg));
-                let samples = lights.sample_split(&x, u, &splitting);
+                let samples = sample_split(&lights.at(&x), u, &splitting);
                 most = most.max(samples.len());
                 for sample in samples.iter().take(50) {
                     count += 1;
-                    let pdf = lights.pdf_split(&x, &sample.hit, &splitting);
+                    let pdf = lights.at(&x).pdf_split(&sample.hit, &splitting);
                     assert!(!differs(pdf, sample.pdf, TOLERANCE), "{sample:?} at {x:?} with {splitting:?}: {pdf}");
                 }
             }
@@ -226,11 +226,11 @@ fn samples_are_reproducible_to_the_bit() {
             .collect();
         let (first, second) = (build(&scene, arities), build(&scene, arities));
         assert_eq!(first.to_bytes(), second.to_bytes());
-        let loaded = first.sample_from_bytes(&queries);
+        let loaded = sample_from_bytes(&first, &queries);
         let mut some = 0;
         for ((x, u), loaded) in queries.iter().zip(&loaded) {
-            let sample = bits(&first.sample(x, *u));
-            assert_eq!(sample, bits(&second.sample(x, *u)));
+            let sample = bits(&first.at(x).sample(*u));
+            assert_eq!(sample, bits(&second.at(x).sample(*u)));
             assert_eq!(sample, bits(loaded));
             some += usize::from(sample.is_some());
         }
@@ -246,13 +246,13 @@ fn samples_are_reproducible_to_the_bit() {
 fn the_density_of_a_direction_counts_every_portal() {
     let outer = LightMesh::quad(Vec3::new(-2.0, -2.0, 2.0), 4.0 * Vec3::Y, 4.0 * Vec3::X).portal();
     let inner = LightMesh::quad(Vec3::new(-0.5, -0.5, 1.0), Vec3::Y, Vec3::X).portal().paint(Paint::Constant(0.5));
-    let lights = build(&Scene::new("nested", vec![outer, inner]), (8, 4));
+    let lights = build(&Scene::new("nested", vec![outer, inner]), Arity::Eight);
     let mut pcg = Pcg32::new(1, 20);
-    let x = ShadingPoint { position: Vec3::new(0.1, -0.1, 0.0), receiver: Receiver::Surface(Vec3::Z) };
+    let x = ShadingPoint::new(Vec3::new(0.1, -0.1, 0.0), Receiver::Surface(Vec3::Z));
     let (mut both, mut one) = (0, 0);
     for _ in 0..10_000 {
-        let sample = lights.sample(&x, pcg.cube()).expect("both are above the horizon");
-        let along = lights.pdf_sample_direction(&x, &sample);
+        let sample = lights.at(&x).sample(pcg.cube()).expect("both are above the horizon");
+        let along = lights.at(&x).pdf_sample_direction(&sample);
         if along > sample.pdf { both += 1 } else { one += 1 }
     }
     assert!(both > 1000 && one > 1000, "{both} {one}");
@@ -270,9 +270,9 @@ fn what_is_dark_next_to_a_very_bright_sky_is_sampled() {
         _ => 0.0,
     };
     scene.sky = Sky::LatLong { size: [16, 8], texels: (0..16 * 8).map(texel).collect() };
-    let lights = build(&scene, (16, 4));
+    let lights = build(&scene, Arity::Sixteen);
     let mut pcg = Pcg32::new(1, 21);
-    let x = ShadingPoint { position: Vec3::ZERO, receiver: Receiver::Surface(Vec3::Z) };
-    let some = (0..100).filter(|_| lights.sample(&x, pcg.cube()).is_some()).count();
+    let x = ShadingPoint::new(Vec3::ZERO, Receiver::Surface(Vec3::Z));
+    let some = (0..100).filter(|_| lights.at(&x).sample(pcg.cube()).is_some()).count();
     assert_eq!(some, 100);
 }

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use crate::common::pcg::Pcg32;
 use crate::common::tier::tier;
-use fanlight::{LightSampler, LightSamplerBuilder, Mesh};
+use fanlight::{Arity, LightSampler, LightSamplerBuilder, Mesh};
 use glam::Vec3;
 
 /// How many times as long as a build of as many triangles at random one of any others may take. One that compares all
@@ -129,6 +129,6 @@ fn a_build_can_be_cancelled() {
         // Other threads may be on their way to report.
         assert!(called.into_inner() < calls + 64);
     }
-    let nothing = LightSamplerBuilder::<8>::new().build_with(|_| ControlFlow::Break(()));
+    let nothing = LightSampler::builder().arity(Arity::Eight).build_with(|_| ControlFlow::Break(()));
     assert!(nothing.is_err_and(|error| error.is_cancelled()));
 }

@@ -1,7 +1,7 @@
 //! Samples fall where the density says.
 
 use crate::common::density::{OnTriangle, bin, id, probes};
-use crate::common::lights::{ARITIES, build};
+use crate::common::lights::{ARITIES, build, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene, random_point};
@@ -36,9 +36,10 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     let mut observed = vec![0.0; total * bins + 1];
     let mut kept = Vec::new();
     for _ in 0..samples {
-        match lights.sample(&x, pcg.cube()) {
+        match lights.at(&x).sample(pcg.cube()) {
             Some(sample) => {
-                let triangle = firsts[sample.hit.triangle.mesh as usize] + sample.hit.triangle.triangle as usize;
+                let triangle =
+                    firsts[sample.hit.triangle.mesh.index() as usize] + sample.hit.triangle.triangle as usize;
                 let count = &mut observed[triangle * bins + bin(sample.hit.barycentrics, DEPTH)];
                 *count += 1.0;
                 if *count <= PROBES {
@@ -58,13 +59,13 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
         } else {
             0.95
         };
-        factor * f64::from(lights.pdf(&x, hit))
+        factor * f64::from(lights.at(&x).pdf(hit))
     };
     let mut expected = Vec::with_capacity(observed.len());
     for triangle in scene.triangles() {
         let on = OnTriangle::new(&scene, triangle, &x, &pdf);
         // The more probable a triangle, the finer what may be missed in it.
-        let least_depth = match lights.pmf(&x, id(triangle)) {
+        let least_depth = match lights.at(&x).pmf(id(triangle)) {
             pmf if pmf > 0.05 => 6,
             pmf if pmf > 1e-4 => 4,
             _ => 2,
@@ -135,12 +136,12 @@ fn triangles_are_chosen_with_their_probability() {
         let triangles: Vec<_> = scene.triangles().map(id).collect();
         let mut observed = vec![0.0; triangles.len() + 1];
         for _ in 0..samples {
-            let chosen = lights.sample(&x, pcg.cube()).map(|sample| sample.hit.triangle);
+            let chosen = lights.at(&x).sample(pcg.cube()).map(|sample| sample.hit.triangle);
             let place = chosen.map_or(Ok(triangles.len()), |chosen| triangles.binary_search(&chosen));
             observed[place.expect("the triangle is one of the scene's")] += 1.0;
         }
         let n = samples as f64;
-        let mut expected: Vec<_> = triangles.iter().map(|t| n * f64::from(lights.pmf(&x, *t))).collect();
+        let mut expected: Vec<_> = triangles.iter().map(|t| n * f64::from(lights.at(&x).pmf(*t))).collect();
         expected.push((n - expected.iter().sum::<f64>()).max(0.0));
         if expected[triangles.len()] < 1e-6 * n {
             expected[triangles.len()] = 0.0;
@@ -166,14 +167,14 @@ fn splitting_visits_triangles_as_often_as_it_expects() {
     let settings = [(0.5, 1, 2 * rounds), (0.9, 2, rounds), (1.0, 2, rounds / 10)];
     let found = parallel::map(settings.len(), |i| {
         let (threshold, levels, rounds) = settings[i];
-        let splitting = Splitting { threshold, levels };
+        let splitting = Splitting::new(threshold, levels);
         let (scene, x, mut pcg) = cloud(i + 3);
         let lights = build(&scene, ARITIES[i]);
         let triangles: Vec<_> = scene.triangles().map(id).collect();
         let mut observed = vec![0u32; triangles.len()];
         let mut drawn = 0;
         for _ in 0..rounds {
-            let samples = lights.sample_split(&x, pcg.cube(), &splitting);
+            let samples = sample_split(&lights.at(&x), pcg.cube(), &splitting);
             drawn += samples.len();
             let mut visited: Vec<_> = samples.iter().map(|sample| sample.hit.triangle).collect();
             visited.sort_unstable();
@@ -185,10 +186,10 @@ fn splitting_visits_triangles_as_often_as_it_expects() {
         // Wherever something arrives from, the ratio of the densities is the ratio of the counts.
         let expected = |t| {
             let places = [[0.25, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-            let hits = places.map(|barycentrics| Hit { triangle: t, barycentrics });
-            let Some(hit) = hits.into_iter().find(|hit| lights.pdf(&x, hit) > 0.0) else { return 0.0 };
-            let single = lights.pdf(&x, &hit);
-            f64::from(lights.pmf(&x, t)) * f64::from(lights.pdf_split(&x, &hit, &splitting)) / f64::from(single)
+            let hits = places.map(|barycentrics| Hit::new(t, barycentrics));
+            let Some(hit) = hits.into_iter().find(|hit| lights.at(&x).pdf(hit) > 0.0) else { return 0.0 };
+            let single = lights.at(&x).pdf(&hit);
+            f64::from(lights.at(&x).pmf(t)) * f64::from(lights.at(&x).pdf_split(&hit, &splitting)) / f64::from(single)
         };
         let expected: Vec<f64> = triangles.iter().map(|t| expected(*t)).collect();
         (observed, expected, drawn)
@@ -232,10 +233,10 @@ fn equal_lights_are_chosen_equally_often_at_any_depth() {
     let mut observed = vec![0.0; 4096];
     let n = 400_000;
     for _ in 0..n {
-        let sample = lights.sample(&x, pcg.cube()).expect("every light is visible");
+        let sample = lights.at(&x).sample(pcg.cube()).expect("every light is visible");
         observed[sample.hit.triangle.triangle as usize] += 1.0;
     }
-    let expected: Vec<_> = scene.triangles().map(|t| f64::from(n) * f64::from(lights.pmf(&x, id(t)))).collect();
+    let expected: Vec<_> = scene.triangles().map(|t| f64::from(n) * f64::from(lights.at(&x).pmf(id(t)))).collect();
     let (p, dump) = chi_square(&observed, &expected);
     assert!(p > SIGNIFICANCE, "p = {p}\n{dump}");
 }

@@ -9,11 +9,11 @@ use std::time::Instant;
 
 use crate::checks;
 use crate::common::hostile::{hostile, random_scene, shading_point};
-use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::lights::{ARITIES, build};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::random_point;
-use fanlight::{LightSample, ShadingPoint};
+use fanlight::{LightSample, LightSampler, ShadingPoint};
 
 /// Largest relative difference of two densities of one point.
 const TOLERANCE: f64 = 1e-5;
@@ -59,7 +59,7 @@ impl Counts {
 }
 
 /// Lights of a number, and points around them. Every fourth scene is made of random bytes, as a fuzzer's are.
-fn scene(number: usize, pcg: &mut Pcg32) -> (Box<dyn Lights>, Vec<ShadingPoint>) {
+fn scene(number: usize, pcg: &mut Pcg32) -> (LightSampler, Vec<ShadingPoint>) {
     if number.is_multiple_of(4) {
         let mut any_point = |i: usize| {
             let mut x = random_point(pcg, i);

@@ -34,7 +34,7 @@ fn lands(ray: &EmissionSample) -> bool {
 
 /// Radiance along a ray, by the scene's description.
 fn radiance(scene: &Scene, ray: &EmissionSample) -> f64 {
-    let (m, t) = (ray.hit.triangle.mesh as usize, ray.hit.triangle.triangle as usize);
+    let (m, t) = (ray.hit.triangle.mesh.index() as usize, ray.hit.triangle.triangle as usize);
     oracle::sent(scene, m, t, ray.hit.barycentrics.map(f64::from), -ray.direction.as_dvec3())
 }
 

@@ -158,7 +158,7 @@ fn meshes() {
     assert_mesh_error("unknown texture", &unknown, &["mesh 1", "texture 6", "has 1"]);
 }
 
-type View<'a> = LightSamplerView<'a, 16, 4>;
+type View<'a> = LightSamplerView<'a>;
 
 /// A sampler with every buffer in use.
 fn full() -> (Scene, LightSampler) {
@@ -177,28 +177,28 @@ fn full() -> (Scene, LightSampler) {
 /// Everything that a host can ask, where results must at least be numbers. Returns the number of samples.
 fn exercise(view: &View<'_>, x: &ShadingPoint, u: [f32; 3]) -> usize {
     let finite = |pdf: f32| assert!(pdf.is_finite() && pdf >= 0.0, "a density of {pdf} at {x:?} with {u:?}");
-    let splitting = Splitting { threshold: 0.8, levels: 2 };
+    let splitting = Splitting::new(0.8, 2);
     let check = |sample: &LightSample| {
         [sample.pdf, sample.pdf_area, sample.pmf].into_iter().for_each(finite);
         assert!(sample.pdf > 0.0 && sample.pdf_area > 0.0 && sample.pmf > 0.0, "{sample:?}");
-        finite(view.pdf(x, &sample.hit));
-        finite(view.pdf_split(x, &sample.hit, &splitting));
-        finite(view.pdf_sample_direction(x, sample));
+        finite(view.at(x).pdf(&sample.hit));
+        finite(view.at(x).pdf_split(&sample.hit, &splitting));
+        finite(view.at(x).pdf_sample_direction(sample));
         assert!(!sample.position.is_nan() && sample.direction.is_finite() && sample.distance.is_finite());
     };
-    let single = view.sample(x, u);
+    let single = view.at(x).sample(u);
     single.iter().for_each(check);
     let mut samples = SmallVec::<[LightSample; 8]>::new();
     view.sample_split(x, u, &splitting, &mut samples);
     samples.iter().for_each(check);
     let direction = Vec3::from(u) - 0.5;
-    finite(view.pdf_direction(x, direction));
-    finite(view.pdf_split_direction(x, direction, &splitting));
+    finite(view.at(x).pdf_direction(direction));
+    finite(view.at(x).pdf_split_direction(direction, &splitting));
     for triangle in [0, 1, 2, 3, u32::MAX] {
         for mesh in [0, 3, 4, u32::MAX] {
             let triangle = TriangleId { mesh, triangle };
-            finite(view.pdf(x, &Hit { triangle, barycentrics: [u[0], u[1]] }));
-            finite(view.pmf(x, triangle));
+            finite(view.at(x).pdf(&Hit { triangle, barycentrics: [u[0], u[1]] }));
+            finite(view.at(x).pmf(triangle));
         }
     }
     single.iter().len() + samples.len()
@@ -293,7 +293,7 @@ fn hostile_shading_points_and_numbers() {
             let normals = [pcg.direction(), Vec3::ZERO, Vec3::NAN, Vec3::INFINITY, Vec3::splat(1e30)];
             let receivers = normals.into_iter().flat_map(|n| [Receiver::Surface(n), Receiver::Transmissive(n)]);
             for receiver in receivers.chain([Receiver::Volume]) {
-                let x = ShadingPoint { position, receiver };
+                let x = ShadingPoint::new(position, receiver);
                 let u =
                     if pcg.below(2) == 0 { pcg.cube() } else { core::array::from_fn(|_| bad[pcg.below(bad.len())]) };
                 let result = catch_unwind(AssertUnwindSafe(|| exercise(&view, &x, u)));
@@ -311,8 +311,8 @@ fn hostile_shading_points_and_numbers() {
 fn nothing_arrives_from_no_lights() {
     let lights = LightSampler::builder().build().expect("no lights are fine");
     let x = ShadingPoint::volume(Vec3::ZERO);
-    assert_eq!(lights.sample(&x, [0.5; 3]), None);
-    assert_eq!(lights.pdf_direction(&x, Vec3::Z), 0.0);
+    assert_eq!(lights.at(&x).sample([0.5; 3]), None);
+    assert_eq!(lights.at(&x).pdf_direction(Vec3::Z), 0.0);
     assert_eq!(exercise(&lights.as_view(), &x, [0.1, 0.2, 0.3]), 0);
     // Black lights are none either, for every arity.
     let mut scene =

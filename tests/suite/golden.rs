@@ -5,11 +5,11 @@
 use std::path::Path;
 
 use crate::common::hostile::{random_scene, shading_point};
-use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::Scene;
-use fanlight::{LightSample, ShadingPoint, Splitting, TriangleId};
+use fanlight::{LightSample, LightSampler, MeshId, ShadingPoint, Splitting, TriangleId};
 
 const SCENES: usize = 70;
 const POINTS: usize = 60;
@@ -32,7 +32,7 @@ impl Hash {
 
     fn add_sample(&mut self, sample: &LightSample) {
         let id = sample.hit.triangle;
-        self.add(&[f32::from_bits(id.mesh), f32::from_bits(id.triangle)]);
+        self.add(&[f32::from_bits(id.mesh.index()), f32::from_bits(id.triangle)]);
         self.add(&sample.hit.barycentrics);
         [sample.position, sample.normal, sample.direction].iter().for_each(|v| self.add(&v.to_array()));
         self.add(&[sample.distance, sample.pdf, sample.pdf_area, sample.pmf]);
@@ -40,18 +40,18 @@ impl Hash {
 }
 
 /// What is asked at one point; the number of samples that were drawn.
-fn ask(lights: &dyn Lights, x: &ShadingPoint, pcg: &mut Pcg32, hash: &mut Hash) -> usize {
+fn ask(lights: &LightSampler, x: &ShadingPoint, pcg: &mut Pcg32, hash: &mut Hash) -> usize {
     let at = lights.at(x);
-    let splitting = Splitting { threshold: 0.7, levels: 2 };
+    let splitting = Splitting::new(0.7, 2);
     let u = pcg.cube();
-    let split = lights.sample_split(x, u, &splitting);
+    let split = sample_split(&lights.at(x), u, &splitting);
     let single = at.sample(u);
     for sample in single.iter().chain(split.iter().take(8)) {
         hash.add_sample(sample);
-        hash.add(&[at.pdf(&sample.hit), at.pmf(sample.hit.triangle), lights.pdf_split(x, &sample.hit, &splitting)]);
+        hash.add(&[at.pdf(&sample.hit), at.pmf(sample.hit.triangle), lights.at(x).pdf_split(&sample.hit, &splitting)]);
         hash.add(&[at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
     }
-    hash.add(&[at.pdf_direction(pcg.direction()), at.pmf(TriangleId { mesh: 0, triangle: 0 })]);
+    hash.add(&[at.pdf_direction(pcg.direction()), at.pmf(TriangleId::new(MeshId::from_index(0), 0))]);
     usize::from(single.is_some()) + split.len()
 }
 
@@ -70,18 +70,18 @@ fn ask_environment(scene: &Scene, pcg: &mut Pcg32, hash: &mut Hash) {
 fn line(number: usize) -> String {
     let mut pcg = Pcg32::new(number as u64, 81);
     let scene = random_scene(number, &mut pcg);
-    let (n, m) = ARITIES[number % ARITIES.len()];
-    let lights = build(&scene, (n, m));
+    let arity = ARITIES[number % ARITIES.len()];
+    let lights = build(&scene, arity);
     let mut hash = Hash::new();
     let mut drawn = 0;
     let points: Vec<_> = (0..POINTS).map(|i| shading_point(number + i, &scene, &mut pcg)).collect();
     for x in &points {
-        drawn += ask(&*lights, x, &mut pcg, &mut hash);
+        drawn += ask(&lights, x, &mut pcg, &mut hash);
     }
     let queries: Vec<_> = points.iter().map(|x| (*x, pcg.cube())).collect();
-    lights.sample_from_bytes(&queries).iter().flatten().for_each(|sample| hash.add_sample(sample));
+    sample_from_bytes(&lights, &queries).iter().flatten().for_each(|sample| hash.add_sample(sample));
     ask_environment(&scene, &mut pcg, &mut hash);
-    format!("{number:2} {n:2}/{m:2} {drawn:5} {:016x} {}\n", hash.0, scene.name)
+    format!("{number:2} {:2}/ 4 {drawn:5} {:016x} {}\n", arity.lanes(), hash.0, scene.name)
 }
 
 fn all() -> String {

@@ -123,7 +123,7 @@ fn rewound(scene: &Scene, x: &ShadingPoint, _: &mut Pcg32) -> Changed {
     }
     let hit = move |hit: Hit| {
         let [b1, b2] = hit.barycentrics;
-        let barycentrics = if two_sided[hit.triangle.mesh as usize] { [b2, b1] } else { [b1, b2] };
+        let barycentrics = if two_sided[hit.triangle.mesh.index() as usize] { [b2, b1] } else { [b1, b2] };
         Hit { barycentrics, ..hit }
     };
     Changed { scene, x: *x, hit: Box::new(hit) }
@@ -143,7 +143,7 @@ fn scene(number: usize, triangles: usize) -> (Scene, Pcg32) {
 
 /// What a sample's point sends to `x` times the cosine there, and the lesser of the cosines at either end.
 fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> (f64, f64) {
-    let (m, t) = (sample.hit.triangle.mesh as usize, sample.hit.triangle.triangle as usize);
+    let (m, t) = (sample.hit.triangle.mesh.index() as usize, sample.hit.triangle.triangle as usize);
     let b = sample.hit.barycentrics.map(f64::from);
     let [v0, v1, v2] = scene.meshes[m].vertices(t).map(|v| v.as_dvec3() - x.position.as_dvec3());
     let direction = (v0 * (1.0 - b[0] - b[1]) + v1 * b[0] + v2 * b[1]).normalize();
@@ -164,11 +164,11 @@ fn what_can_be_drawn_can_be_drawn_in_the_changed_scene() {
                 let changed = change(&scene, &x, &mut pcg);
                 let other = changed.scene.build::<16>();
                 for _ in 0..200 {
-                    let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
+                    let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
                     let (value, cosine) = contribution(&scene, &x, &sample);
                     if value > 0.0 && cosine > GRAZING {
                         counted += 1;
-                        let found = other.pdf(&changed.x, &(changed.hit)(sample.hit));
+                        let found = other.at(&changed.x).pdf(&(changed.hit)(sample.hit));
                         assert!(found > 0.0, "{} {name}: {sample:?} from {x:?}", scene.name);
                     }
                 }
@@ -198,10 +198,10 @@ fn the_density_of_one_triangle_moves_with_it() {
                 let changed = change(&scene, &x, &mut pcg);
                 let other = changed.scene.build::<16>();
                 for _ in 0..500 {
-                    let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
+                    let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
                     let (value, cosine) = contribution(&scene, &x, &sample);
                     if value > 0.0 && cosine > GRAZING {
-                        ratios.push(f64::from(other.pdf(&changed.x, &(changed.hit)(sample.hit)) / sample.pdf));
+                        ratios.push(f64::from(other.at(&changed.x).pdf(&(changed.hit)(sample.hit)) / sample.pdf));
                     }
                 }
             }
@@ -215,10 +215,10 @@ fn the_density_of_one_triangle_moves_with_it() {
     assert!(equal as f64 > 0.99 * ratios.len() as f64, "{equal} of {}", ratios.len());
 }
 
-fn estimate(scene: &Scene, lights: &LightSampler<16>, x: &ShadingPoint, pcg: &mut Pcg32) -> Mean {
+fn estimate(scene: &Scene, lights: &LightSampler, x: &ShadingPoint, pcg: &mut Pcg32) -> Mean {
     let mut mean = Mean::default();
     for _ in 0..20_000 {
-        let sample = lights.sample(x, pcg.cube());
+        let sample = lights.at(x).sample(pcg.cube());
         mean.add(sample.map_or(0.0, |sample| contribution(scene, x, &sample).0 / f64::from(sample.pdf)));
     }
     mean
@@ -261,10 +261,10 @@ fn the_winding_says_which_side_is_lit() {
         let x = ShadingPoint::volume(2.0 * Vec3::from(pcg.cube()) - 0.5);
         let [one, other, both] = [scene, other, both].map(|scene| scene.build::<16>());
         for _ in 0..20 {
-            let Some(sample) = both.sample(&x, pcg.cube()) else { continue };
+            let Some(sample) = both.at(&x).sample(pcg.cube()) else { continue };
             let [b1, b2] = sample.hit.barycentrics;
             let here = one.pdf(&x, &sample.hit);
-            let there = other.pdf(&x, &Hit { barycentrics: [b2, b1], ..sample.hit });
+            let there = other.at(&x).pdf(&Hit { barycentrics: [b2, b1], ..sample.hit });
             assert!((here > 0.0) != (there > 0.0), "{here} {there} at {sample:?} from {x:?}");
             if here > 0.0 { front += 1 } else { back += 1 }
         }

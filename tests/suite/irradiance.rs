@@ -4,13 +4,13 @@
 //! seeds are fixed, it either does or does not. A point that is off is done again with ten times the samples, which
 //! tells bias from chance.
 
-use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::lights::{ARITIES, build, sample_split};
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky, random_point};
 use crate::common::statistics::Mean;
 use crate::common::tier::tier;
 use crate::common::{oracle, parallel};
-use fanlight::{Filter, LightSample, Receiver, ShadingPoint, Splitting, Wrap};
+use fanlight::{Filter, LightSample, LightSampler, Receiver, ShadingPoint, Splitting, Wrap};
 use glam::{DVec3, Vec3};
 
 /// Standard errors that an estimate may be off.
@@ -34,7 +34,7 @@ enum Estimator {
 
 /// Direction and contribution times the cosine of a sample's point, in double precision.
 fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> f64 {
-    let (m, t) = (sample.hit.triangle.mesh as usize, sample.hit.triangle.triangle as usize);
+    let (m, t) = (sample.hit.triangle.mesh.index() as usize, sample.hit.triangle.triangle as usize);
     let b = sample.hit.barycentrics.map(f64::from);
     let [v0, v1, v2] = scene.meshes[m].vertices(t).map(|v| v.as_dvec3() - x.position.as_dvec3());
     let direction = (v0 * (1.0 - b[0] - b[1]) + v1 * b[0] + v2 * b[1]).normalize();
@@ -46,18 +46,18 @@ fn arriving(scene: &Scene, x: &ShadingPoint, direction: Vec3) -> f64 {
     oracle::through_portals(scene, x, direction) * oracle::cosine(&x.receiver, direction)
 }
 
-fn estimate(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, estimator: Estimator, n: usize, seed: u64) -> Mean {
+fn estimate(scene: &Scene, lights: &LightSampler, x: &ShadingPoint, estimator: Estimator, n: usize, seed: u64) -> Mean {
     let mut pcg = Pcg32::new(seed, 21);
     let mut mean = Mean::default();
     for _ in 0..n {
         let u = pcg.cube();
         if let Estimator::Split(splitting) = estimator {
-            let samples = lights.sample_split(x, u, &splitting);
+            let samples = sample_split(&lights.at(x), u, &splitting);
             mean.add(samples.iter().map(|s| contribution(scene, x, s) / f64::from(s.pdf)).sum());
             continue;
         }
-        mean.add(lights.sample(x, u).map_or(0.0, |s| match estimator {
-            Estimator::Direction => arriving(scene, x, s.direction) / f64::from(lights.pdf_sample_direction(x, &s)),
+        mean.add(lights.at(x).sample(u).map_or(0.0, |s| match estimator {
+            Estimator::Direction => arriving(scene, x, s.direction) / f64::from(lights.at(x).pdf_sample_direction(&s)),
             Estimator::DirectionByPoint => arriving(scene, x, s.direction) / f64::from(s.pdf),
             _ => contribution(scene, x, &s) / f64::from(s.pdf),
         }));
@@ -98,7 +98,7 @@ fn examine(case: &Case, number: usize) -> Found {
     let mut found =
         Found { name: format!("{} {x:?}", case.name), exact, change, mean: 0.0, error: 0.0, repeated: false };
     let mut run = |n: usize, seed: u64| {
-        let mean = estimate(&scene, &*lights, &x, case.estimator, n, seed);
+        let mean = estimate(&scene, &lights, &x, case.estimator, n, seed);
         (found.mean, found.error) = (mean.mean(), mean.error());
         found.deviation() <= LIMIT
     };
@@ -175,7 +175,7 @@ fn below_window(pcg: &mut Pcg32, number: usize) -> ShadingPoint {
     let position = Vec3::new(pcg.within(-1.0, 1.0), pcg.within(-1.0, 1.0), pcg.within(-1.5, -0.3));
     let normal = (pcg.direction() + 1.2 * (-position).normalize()).normalize();
     let receiver = [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][number % 3];
-    ShadingPoint { position, receiver }
+    ShadingPoint::new(position, receiver)
 }
 
 /// Turns the sky so that its one lit pixel is seen through a place in the opening.
@@ -294,7 +294,7 @@ fn adaptive_splitting() {
         scene.sky = Sky::random(pcg, 1);
         (scene, random_point(pcg, number))
     };
-    let estimator = Estimator::Split(Splitting { threshold: 0.9, levels: 2 });
+    let estimator = Estimator::Split(Splitting::new(0.9, 2));
     assert_unbiased(&Case { name: "adaptive splitting", scene, integral: over_lights, estimator });
 }
 
@@ -314,7 +314,7 @@ fn nested(pcg: &mut Pcg32, number: usize) -> (Scene, ShadingPoint) {
     // So near to the axis that the inner opening is seen before the outer one.
     let position = Vec3::new(pcg.within(-0.3, 0.3), pcg.within(-0.3, 0.3), pcg.within(-0.8, -0.3));
     let receiver = [Receiver::Surface(Vec3::Z), Receiver::Transmissive(pcg.direction()), Receiver::Volume][number % 3];
-    (scene, ShadingPoint { position, receiver })
+    (scene, ShadingPoint::new(position, receiver))
 }
 
 #[test]

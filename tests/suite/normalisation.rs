@@ -2,13 +2,13 @@
 //! returns one.
 
 use crate::common::density::{OnTriangle, id, probes};
-use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::lights::{ARITIES, build};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene, random_point};
 use crate::common::statistics::{binomial_p, sidak};
 use crate::common::tier::{some, tier};
-use fanlight::{Hit, LightSample, ShadingPoint};
+use fanlight::{Hit, LightSample, LightSampler, ShadingPoint};
 use glam::Vec3;
 
 /// Error granted to an integral.
@@ -28,7 +28,13 @@ struct Found {
 
 /// Integral of the density over all triangles, and the most that it can be wrong by where the density varies over
 /// less than the integration resolves.
-fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[LightSample], wrong: bool) -> (f64, f64) {
+fn integral(
+    scene: &Scene,
+    lights: &LightSampler,
+    x: &ShadingPoint,
+    samples: &[LightSample],
+    wrong: bool,
+) -> (f64, f64) {
     let count = scene.triangles().count();
     // The more probable a triangle, the finer what may be missed in it.
     let least_depth = |pmf: f64| match pmf {
@@ -39,9 +45,9 @@ fn integral(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: &[Lig
     let probes = probes(scene, samples);
     let pdf = |hit: &Hit| {
         let factor = if wrong && hit.barycentrics[0] > 0.5 { 1.1 } else { 1.0 };
-        factor * f64::from(lights.pdf(x, hit))
+        factor * f64::from(lights.at(x).pdf(hit))
     };
-    let mut triangles: Vec<_> = scene.triangles().map(|t| (f64::from(lights.pmf(x, id(t))), t)).collect();
+    let mut triangles: Vec<_> = scene.triangles().map(|t| (f64::from(lights.at(x).pmf(id(t))), t)).collect();
     triangles.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut left: f64 = triangles.iter().map(|t| t.0).sum();
     assert!(left <= 1.0 + 1e-5, "{}: the triangles' probabilities add up to {left}", scene.name);
@@ -79,9 +85,9 @@ fn examine_moved(
     let lights = build(&scene, arities);
     let mut x = random_point(&mut pcg, receiver);
     x.position = change(x.position);
-    let samples: Vec<_> = (0..count).filter_map(|_| lights.sample(&x, pcg.cube())).collect();
+    let samples: Vec<_> = (0..count).filter_map(|_| lights.at(&x).sample(pcg.cube())).collect();
     let probing = &samples[..samples.len().min(2000)];
-    let (integral, unresolved) = integral(&scene, &*lights, &x, probing, wrong);
+    let (integral, unresolved) = integral(&scene, &lights, &x, probing, wrong);
     let name = format!("{} {arities:?} {:?} {x:?}", scene.name, scene.illumination);
     Found { name, integral, unresolved, samples: count, missed: count - samples.len() }
 }

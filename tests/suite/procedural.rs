@@ -1,14 +1,13 @@
 //! Weights that a function gives, next to an image of the same function.
 
 use crate::common::density::{OnTriangle, bin, probes};
-use crate::common::lights::Lights;
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{LightMesh, Scene, Sky};
 use crate::common::statistics::{Mean, chi_square, sidak};
 use fanlight::{
-    Error, Filter, Illumination, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Procedural, ShadingPoint,
-    Texture, Weight,
+    Error, Filter, Illumination, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshId, Procedural,
+    ShadingPoint, Texture, Weight,
 };
 use glam::{Mat3, Vec2, Vec3, vec2, vec3};
 
@@ -65,7 +64,7 @@ fn light() -> Scene {
     }
 }
 
-fn sampler<const N: usize, const M: usize>(scene: &Scene, function: &dyn Procedural) -> LightSampler<N, M> {
+fn sampler(scene: &Scene, function: &dyn Procedural) -> LightSampler {
     let mut builder = LightSamplerBuilder::new();
     let weight = Weight::Texture(builder.add_procedural(function));
     let LightMesh { positions, indices, uvs, .. } = &scene.meshes[0];
@@ -83,23 +82,23 @@ fn points() -> [ShadingPoint; 3] {
 
 /// p-value of samples over the cells of both triangles, the integral of the density, and the largest difference
 /// between the density of a sample and that of its hit.
-fn examine(lights: &dyn Lights, scene: &Scene, x: &ShadingPoint, least_depth: u32, wrong: bool) -> (f64, f64, f64) {
+fn examine(lights: &LightSampler, scene: &Scene, x: &ShadingPoint, least_depth: u32, wrong: bool) -> (f64, f64, f64) {
     const DEPTH: u32 = 3;
     const SAMPLES: usize = 50_000;
     let mut pcg = Pcg32::new(7, 61);
     let bins = 1 << (2 * DEPTH);
     let (mut observed, mut kept, mut worst) = (vec![0.0; 2 * bins], Vec::new(), 0.0_f64);
     for _ in 0..SAMPLES {
-        let Some(sample) = lights.sample(x, pcg.cube()) else { continue };
+        let Some(sample) = lights.at(x).sample(pcg.cube()) else { continue };
         observed[sample.hit.triangle.triangle as usize * bins + bin(sample.hit.barycentrics, DEPTH)] += 1.0;
-        worst = worst.max(f64::from(lights.pdf(x, &sample.hit) / sample.pdf - 1.0).abs());
+        worst = worst.max(f64::from(lights.at(x).pdf(&sample.hit) / sample.pdf - 1.0).abs());
         kept.push(sample);
     }
     kept.truncate(2000);
     let probes = probes(scene, &kept);
     let pdf = |hit: &fanlight::Hit| {
         let factor = if wrong && hit.barycentrics[1] > 0.5 { 1.1 } else { 1.0 };
-        factor * f64::from(lights.pdf(x, hit))
+        factor * f64::from(lights.at(x).pdf(hit))
     };
     let mut expected = Vec::new();
     for (triangle, probes) in probes[0].iter().enumerate() {
@@ -120,12 +119,12 @@ fn check_density(count: usize, case: impl Fn(usize) -> usize + Sync) {
     let scene = light();
     let found = parallel::map(count, |i| {
         let (function, tolerance) = CASES[case(i) / 3];
-        let lights: Box<dyn Lights> = match case(i) % 3 {
+        let lights: LightSampler = match case(i) % 3 {
             0 => Box::new(sampler::<16, 4>(&scene, function)),
             1 => Box::new(sampler::<8, 16>(&scene, function)),
             _ => Box::new(sampler::<8, 64>(&scene, function)),
         };
-        (examine(&*lights, &scene, &points()[case(i) % 3], 6, false), tolerance)
+        (examine(&lights, &scene, &points()[case(i) % 3], 6, false), tolerance)
     });
     for ((p, integral, worst), tolerance) in found {
         println!("p {p:.3}, integral {integral:.6}, largest difference {worst:e}");
@@ -161,7 +160,7 @@ fn wherever_the_function_is_bright_it_can_be_sampled() {
         let mut dark = 0;
         for _ in 0..20_000 {
             let barycentrics = [pcg.f32(), pcg.f32()].map(|b| 0.5 * b);
-            let hit = fanlight::Hit { triangle: fanlight::TriangleId { mesh: 0, triangle: 0 }, barycentrics };
+            let hit = fanlight::Hit { triangle: fanlight::TriangleId::new(MeshId::from_index(0), 0), barycentrics };
             let [a, b, c] = [0, 1, 2].map(|i| scene.meshes[0].uvs[i]);
             let uv = a + barycentrics[0] * (b - a) + barycentrics[1] * (c - a);
             let pdf = lights.pdf(&points()[0], &hit);
@@ -183,7 +182,7 @@ fn estimate(lights: &LightSampler, x: &ShadingPoint, value: impl Fn(Vec3) -> f32
     let mut pcg = Pcg32::new(5, 63);
     let mut mean = Mean::default();
     for _ in 0..SAMPLES {
-        let sample = lights.sample(x, pcg.cube());
+        let sample = lights.at(x).sample(pcg.cube());
         mean.add(sample.map_or(0.0, |s| f64::from(value(s.position) * x.cosine(s.direction) / s.pdf)));
     }
     let deviation = mean.error() * f64::from(SAMPLES).sqrt();
@@ -213,7 +212,11 @@ fn a_function_is_as_good_a_guide_as_an_image_of_it() {
     for (name, function, is_tight) in [("dots", DOTS, true), ("waves", WAVES, true), ("loose", LOOSE, false)] {
         let [image, unaware] = [512, 0].map(|size| by_image(&scene, function, size));
         let lights = sampler::<16, 4>(&scene, function);
-        println!("{name}: {:?} and {:?} bytes", image.as_view().bytes()[2], lights.as_view().bytes()[2]);
+        println!(
+            "{name}: {:?} and {:?} bytes",
+            image.as_view().bytes().texture_trees,
+            lights.as_view().bytes().texture_trees
+        );
         for x in points() {
             let value = |p: Vec3| function.weight(COPIES * 0.5 * vec2(p.x + 1.0, p.y + 1.0));
             let image = estimate(&image, &x, value).2;
@@ -242,7 +245,7 @@ fn cells(count: u32, scale: f32, function: &dyn Procedural) -> usize {
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     let words = crate::common::lights::aligned(&bytes);
     LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
-    lights.as_view().bytes()[2]
+    lights.as_view().bytes().texture_trees
 }
 
 #[test]

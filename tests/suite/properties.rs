@@ -4,8 +4,8 @@ use core::cell::Cell;
 
 use approx::assert_relative_eq;
 use fanlight::{
-    Environment, Filter, Hit, LightSampler, LightSamplerView, Mesh, Receiver, ShadingPoint, Sides, Texture, TriangleId,
-    Weight,
+    Environment, Filter, Hit, LightSampler, LightSamplerView, Mesh, MeshId, Receiver, ShadingPoint, Sides, Texture,
+    TriangleId, Weight,
 };
 use glam::{DVec3, Vec2, Vec3};
 use proptest::prelude::*;
@@ -132,11 +132,11 @@ fn a_sample_has_the_density_that_pdf_finds() {
         let lights = build(&soup, &texels, &sky, 1.0);
         let mut compared = 0;
         for u in us {
-            if let Some(sample) = lights.sample(&x, u) {
+            if let Some(sample) = lights.at(&x).sample(u) {
                 compared += 1;
-                assert_relative_eq!(lights.pdf(&x, &sample.hit), sample.pdf, max_relative = 1e-5);
+                assert_relative_eq!(lights.at(&x).pdf(&sample.hit), sample.pdf, max_relative = 1e-5);
                 prop_assert!(sample.pdf.is_normal() && sample.pdf_area > 0.0 && sample.distance > 0.0);
-                prop_assert!(lights.pdf_sample_direction(&x, &sample) >= sample.pdf);
+                prop_assert!(lights.at(&x).pdf_sample_direction(&sample) >= sample.pdf);
                 assert_relative_eq!(sample.direction.length(), 1.0, max_relative = 1e-5);
             }
         }
@@ -164,9 +164,8 @@ fn what_sends_light_can_be_drawn() {
             if lit < 1e-3 || cosine(&x, at.normalize()) < 1e-3 || is_thin || at.length() < 1e-5 * f64::from(size) {
                 continue;
             }
-            let hit =
-                Hit { triangle: TriangleId { mesh: number as u32, triangle: 0 }, barycentrics: [b1 as f32, b2 as f32] };
-            prop_assert!(lights.pdf(&x, &hit) > 0.0, "{hit:?} sends light to {x:?}");
+            let hit = Hit::new(TriangleId::new(MeshId::from_index(number as u32), 0), [b1 as f32, b2 as f32]);
+            prop_assert!(lights.at(&x).pdf(&hit) > 0.0, "{hit:?} sends light to {x:?}");
             compared += 1;
         }
         Ok(compared)
@@ -193,12 +192,12 @@ fn the_density_of_a_direction_is_the_sum_over_what_it_crosses() {
                 let is_thin = normal.length() < 1e-3 * size * size || height < 1e-3 * size;
                 is_clear &= least.abs() > 1e-3 && (least < -1.0 || !is_thin);
                 if least > 0.0 {
-                    let triangle = TriangleId { mesh: number as u32, triangle: 0 };
-                    sum += lights.pdf(&x, &Hit { triangle, barycentrics: barycentrics.map(|b| b as f32) });
+                    let triangle = TriangleId::new(MeshId::from_index(number as u32), 0);
+                    sum += lights.at(&x).pdf(&Hit { triangle, barycentrics: barycentrics.map(|b| b as f32) });
                 }
             }
             if is_clear {
-                let found = lights.pdf_direction(&x, direction);
+                let found = lights.at(&x).pdf_direction(direction);
                 prop_assert_eq!(found > 0.0, sum > 0.0);
                 assert_relative_eq!(found, sum, max_relative = 1e-3);
                 compared += usize::from(found > 0.0);
@@ -216,8 +215,8 @@ fn bytes_hold_the_same_lights() {
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&lights.to_bytes());
         let view: LightSamplerView<'_> =
             LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes are whole");
-        let sample = lights.sample(&x, u);
-        prop_assert_eq!(view.sample(&x, u), sample);
+        let sample = lights.at(&x).sample(u);
+        prop_assert_eq!(view.at(&x).sample(u), sample);
         Ok(usize::from(sample.is_some()))
     });
 }
@@ -230,9 +229,9 @@ fn a_larger_scene_has_the_same_densities() {
         let scale = 2f32.powi(exponent);
         let (lights, larger) = (build(&soup, &texels, &sky, 1.0), build(&soup, &texels, &sky, scale));
         let far = ShadingPoint { position: x.position * scale, ..x };
-        let (Some(a), Some(b)) = (lights.sample(&x, u), larger.sample(&far, u)) else { return Ok(0) };
-        assert_relative_eq!(lights.pdf(&x, &a.hit), larger.pdf(&far, &a.hit), max_relative = 1e-4);
-        assert_relative_eq!(lights.pdf(&x, &b.hit), larger.pdf(&far, &b.hit), max_relative = 1e-4);
+        let (Some(a), Some(b)) = (lights.at(&x).sample(u), larger.sample(&far, u)) else { return Ok(0) };
+        assert_relative_eq!(lights.at(&x).pdf(&a.hit), larger.pdf(&far, &a.hit), max_relative = 1e-4);
+        assert_relative_eq!(lights.at(&x).pdf(&b.hit), larger.pdf(&far, &b.hit), max_relative = 1e-4);
         Ok(1)
     });
 }

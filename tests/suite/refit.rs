@@ -41,7 +41,7 @@ fn changed(scene: &Scene, pcg: &mut Pcg32) -> (Scene, Vec<f32>) {
     (scene, scales)
 }
 
-fn refit<const N: usize, const M: usize>(lights: &mut LightSampler<N, M>, scene: &Scene, scales: &[f32]) {
+fn refit(lights: &mut LightSampler, scene: &Scene, scales: &[f32]) {
     let mut updates = Vec::new();
     for (number, mesh) in (0..).zip(&scene.meshes) {
         let update = MeshUpdate::new(number).moved(&mesh.positions, &mesh.indices);
@@ -50,7 +50,7 @@ fn refit<const N: usize, const M: usize>(lights: &mut LightSampler<N, M>, scene:
     lights.refit(&updates).expect("the changes are valid");
 }
 
-fn samples<const N: usize>(lights: &LightSampler<N>, count: usize) -> Vec<Option<LightSample>> {
+fn samples(lights: &LightSampler, count: usize) -> Vec<Option<LightSample>> {
     let mut pcg = Pcg32::new(1, 32);
     (0..count).map(|i| lights.sample(&random_point(&mut pcg, i), pcg.cube())).collect()
 }
@@ -92,12 +92,12 @@ fn the_density_is_that_of_the_samples() {
         refit(&mut lights, &other, &scales);
         for i in 0..3000 {
             let x = random_point(&mut pcg, i);
-            let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
+            let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
             drawn += 1;
-            let again = lights.pdf(&x, &sample.hit);
+            let again = lights.at(&x).pdf(&sample.hit);
             assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{}: {} {again}", other.name, sample.pdf);
             let [a, b, c] =
-                other.meshes[sample.hit.triangle.mesh as usize].vertices(sample.hit.triangle.triangle as usize);
+                other.meshes[sample.hit.triangle.mesh.index() as usize].vertices(sample.hit.triangle.triangle as usize);
             let [b1, b2] = sample.hit.barycentrics;
             let there = a * (1.0 - b1 - b2) + b * b1 + c * b2;
             assert!(there.distance(sample.position) < 1e-4, "the sample is not on the moved triangle");
@@ -117,17 +117,17 @@ fn the_density_integrates_to_one() {
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
         let x = random_point(&mut pcg, 2);
-        let drawn: Vec<_> = (0..20_000).filter_map(|_| lights.sample(&x, pcg.cube())).collect();
+        let drawn: Vec<_> = (0..20_000).filter_map(|_| lights.at(&x).sample(pcg.cube())).collect();
         let missed = 1.0 - drawn.len() as f64 / 20_000.0;
         let probes = probes(&other, &drawn[..drawn.len().min(2000)]);
-        let pdf = |hit: &Hit| f64::from(lights.pdf(&x, hit));
+        let pdf = |hit: &Hit| f64::from(lights.at(&x).pdf(hit));
         let (mut sum, mut unresolved, mut pmfs) = (0.0, 0.0, 0.0);
         for (m, t) in other.triangles() {
             let on = OnTriangle::new(&other, (m, t), &x, &pdf);
             let (whole, open) = on.integrate(0, 4, &probes[m][t]);
             sum += whole[0];
             unresolved += open;
-            pmfs += f64::from(lights.pmf(&x, id((m, t))));
+            pmfs += f64::from(lights.at(&x).pmf(id((m, t))));
         }
         (other.name, sum, unresolved, missed, pmfs)
     });
@@ -140,7 +140,7 @@ fn the_density_integrates_to_one() {
 
 /// What a sample's point sends to `x`, times the cosine.
 fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> f64 {
-    let (m, t) = (sample.hit.triangle.mesh as usize, sample.hit.triangle.triangle as usize);
+    let (m, t) = (sample.hit.triangle.mesh.index() as usize, sample.hit.triangle.triangle as usize);
     let b = sample.hit.barycentrics.map(f64::from);
     let [v0, v1, v2] = scene.meshes[m].vertices(t).map(|v| v.as_dvec3() - x.position.as_dvec3());
     let direction: DVec3 = (v0 * (1.0 - b[0] - b[1]) + v1 * b[0] + v2 * b[1]).normalize();
@@ -157,14 +157,14 @@ fn estimates_agree_with_the_integral_and_with_a_new_build() {
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
         let fresh = other.build::<16, 4>();
-        let x = (0..100).map(|i| random_point(&mut pcg, i)).find(|x| lights.sample(x, [0.5; 3]).is_some());
+        let x = (0..100).map(|i| random_point(&mut pcg, i)).find(|x| lights.at(x).sample([0.5; 3]).is_some());
         let x = x.expect("some point is lit");
         let sent = |m, t, b, direction| oracle::sent(&other, m, t, b, direction);
         let (exact, change) = oracle::converged(5e-4, |count| oracle::over_lights(&other, &x, None, count, &sent));
         let estimate = |lights: &LightSampler, pcg: &mut Pcg32| {
             let mut mean = Mean::default();
             for _ in 0..100_000 {
-                let sample = lights.sample(&x, pcg.cube());
+                let sample = lights.at(&x).sample(pcg.cube());
                 mean.add(sample.map_or(0.0, |s| contribution(&other, &x, &s) / f64::from(s.pdf)));
             }
             mean
@@ -200,22 +200,22 @@ fn a_mesh_that_is_off_is_never_sampled() {
         scene.meshes.iter_mut().for_each(|mesh| mesh.indices.truncate(if count == 1 { 1 } else { 2 }));
         let mut lights = scene.build::<16, 4>();
         let x = ShadingPoint::surface(Vec3::new(0.1, 0.0, 0.0), Vec3::Z);
-        let sum = |lights: &LightSampler| -> f32 { scene.triangles().map(|t| lights.pmf(&x, id(t))).sum() };
+        let sum = |lights: &LightSampler| -> f32 { scene.triangles().map(|t| lights.at(&x).pmf(id(t))).sum() };
         assert!((sum(&lights) - 1.0).abs() < 1e-5);
         lights.refit(&[MeshUpdate::new(0).scaled(0.0)]).expect("zero is valid");
         let mut pcg = Pcg32::new(9, 33);
         for _ in 0..2000 {
-            let sample = lights.sample(&x, pcg.cube());
+            let sample = lights.at(&x).sample(pcg.cube());
             assert!(sample.is_none_or(|sample| sample.hit.triangle.mesh != 0));
             assert_eq!(sample.is_some(), count > 1);
         }
-        assert_eq!(lights.pmf(&x, id_of(0, 0)), 0.0);
-        assert_eq!(lights.pdf(&x, &Hit { triangle: id_of(0, 0), barycentrics: [0.3, 0.3] }), 0.0);
-        assert_eq!(lights.pdf_direction(&x, Vec3::Z) > 0.0, count > 1);
+        assert_eq!(lights.at(&x).pmf(id_of(0, 0)), 0.0);
+        assert_eq!(lights.at(&x).pdf(&Hit::new(id_of(0, 0), [0.3, 0.3])), 0.0);
+        assert_eq!(lights.at(&x).pdf_direction(Vec3::Z) > 0.0, count > 1);
         let rest = if count > 1 { 1.0 } else { 0.0 };
         assert!((sum(&lights) - rest).abs() < 1e-5, "{count}: {}", sum(&lights));
         lights.refit(&[MeshUpdate::new(0).scaled(1.0)]).expect("one is valid");
-        assert!((sum(&lights) - 1.0).abs() < 1e-5 && lights.pmf(&x, id_of(0, 0)) > 0.0);
+        assert!((sum(&lights) - 1.0).abs() < 1e-5 && lights.at(&x).pmf(id_of(0, 0)) > 0.0);
     }
 }
 
@@ -245,8 +245,8 @@ fn suns_are_seen_through_the_portals_that_are_on() {
     let mut into_sun = |lights: &LightSampler, mesh: u32| {
         let mut count = 0;
         for _ in 0..4000 {
-            let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
-            let again = lights.pdf(&x, &sample.hit);
+            let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
+            let again = lights.at(&x).pdf(&sample.hit);
             assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{} {again}", sample.pdf);
             count += usize::from(sample.hit.triangle.mesh == mesh && sample.direction.dot(sun) > 0.99);
         }
@@ -265,18 +265,18 @@ fn triangles_may_lose_their_area_and_get_it_back() {
     let scene = squares();
     let mut lights = scene.build::<4, 4>();
     let x = ShadingPoint::surface(Vec3::new(0.1, 0.0, 0.0), Vec3::Z);
-    let before = lights.pmf(&x, id_of(1, 1));
+    let before = lights.at(&x).pmf(id_of(1, 1));
     let mut flat = scene.clone();
     flat.meshes[1].positions[3] = flat.meshes[1].positions[0];
     refit(&mut lights, &flat, &[]);
-    assert_eq!(lights.pmf(&x, id_of(1, 1)), 0.0);
-    assert_eq!(lights.pdf(&x, &Hit { triangle: id_of(1, 1), barycentrics: [0.2, 0.2] }), 0.0);
-    let sum: f32 = flat.triangles().map(|t| lights.pmf(&x, id(t))).sum();
+    assert_eq!(lights.at(&x).pmf(id_of(1, 1)), 0.0);
+    assert_eq!(lights.at(&x).pdf(&Hit::new(id_of(1, 1), [0.2, 0.2])), 0.0);
+    let sum: f32 = flat.triangles().map(|t| lights.at(&x).pmf(id(t))).sum();
     assert!((sum - 1.0).abs() < 1e-5, "{sum}");
     let mut pcg = Pcg32::new(11, 33);
-    (0..2000).for_each(|_| assert_ne!(lights.sample(&x, pcg.cube()).map(|s| s.hit.triangle), Some(id_of(1, 1))));
+    (0..2000).for_each(|_| assert_ne!(lights.at(&x).sample(pcg.cube()).map(|s| s.hit.triangle), Some(id_of(1, 1))));
     refit(&mut lights, &scene, &[]);
-    assert_eq!(lights.pmf(&x, id_of(1, 1)), before);
+    assert_eq!(lights.at(&x).pmf(id_of(1, 1)), before);
 }
 
 fn assert_refused(lights: &mut LightSampler, updates: &[MeshUpdate<'_>], parts: &[&str]) {
@@ -344,7 +344,7 @@ fn noise(lights: &LightSampler) -> f64 {
     let relative_variance = |x: &ShadingPoint| {
         let mut mean = Mean::default();
         for _ in 0..1000 {
-            let sample = lights.sample(x, pcg.cube());
+            let sample = lights.at(x).sample(pcg.cube());
             let cosine = |s: &LightSample| oracle::cosine(&x.receiver, s.direction.as_dvec3());
             mean.add(sample.map_or(0.0, |s| cosine(&s) / f64::from(s.pdf)));
         }
@@ -388,6 +388,6 @@ fn bytes_hold_what_has_changed() {
     let view = fanlight::LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes load");
     for i in 0..2000 {
         let (x, u) = (random_point(&mut pcg, i), pcg.cube());
-        assert_eq!(view.sample(&x, u), lights.sample(&x, u));
+        assert_eq!(view.at(&x).sample(u), lights.at(&x).sample(u));
     }
 }

@@ -120,14 +120,14 @@ fn densities_agree_in_and_beside_the_sun() {
         let (mut mismatches, mut drawn) = (0, 0);
         for x in points() {
             for _ in 0..3000 {
-                let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
+                let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
                 drawn += 1;
-                let again = lights.pdf(&x, &sample.hit);
+                let again = lights.at(&x).pdf(&sample.hit);
                 assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{again} {}", sample.pdf);
-                let direction = lights.pdf_sample_direction(&x, &sample);
+                let direction = lights.at(&x).pdf_sample_direction(&sample);
                 assert!(direction >= sample.pdf * 0.999_999);
                 // Next to a border of cells or texels the ray may find the other side.
-                mismatches += u32::from((lights.pdf_direction(&x, sample.direction) / direction - 1.0).abs() > 1e-3);
+                mismatches += u32::from((lights.at(&x).pdf_direction(sample.direction) / direction - 1.0).abs() > 1e-3);
             }
         }
         assert!(drawn > 2500 * points().len(), "{wall:?}: only {drawn} samples");
@@ -155,8 +155,8 @@ fn check_irradiance(wall: Wall, largest: f64) {
         let value = |sample: &LightSample, pdf: f32| {
             if open(sample.direction) { arrives(sample.direction) / f64::from(pdf) } else { 0.0 }
         };
-        let by_direction = |s: LightSample| value(&s, lights.pdf_sample_direction(&x, &s));
-        let single = estimate(20_000, || lights.sample(&x, pcg.cube()).map_or(0.0, by_direction));
+        let by_direction = |s: LightSample| value(&s, lights.at(&x).pdf_sample_direction(&s));
+        let single = estimate(20_000, || lights.at(&x).sample(pcg.cube()).map_or(0.0, by_direction));
         let mut estimates = vec![single];
         // The density of a split sample is that of its point: no estimator where openings overlap.
         if wall != Wall::Nested {
@@ -217,7 +217,7 @@ fn split_samples_have_the_density_that_pdf_split_finds() {
             for sample in samples {
                 drawn += 1;
                 let hit: Hit = sample.hit;
-                let again = lights.pdf_split(&x, &hit, &splitting);
+                let again = lights.at(&x).pdf_split(&hit, &splitting);
                 assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{again} {}", sample.pdf);
             }
         }

@@ -61,8 +61,8 @@ impl<const N: usize> Fanlight<'_, N> {
 impl<const N: usize> Method for Fanlight<'_, N> {
     #[inline]
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
-        let sample = self.sampler.sample(x, u)?;
-        let pdf = if self.layered { self.sampler.pdf_sample_direction(x, &sample) } else { sample.pdf };
+        let sample = self.sampler.at(x).sample(u)?;
+        let pdf = if self.layered { self.sampler.at(x).pdf_sample_direction(&sample) } else { sample.pdf };
         Some(self.drawn(&sample, pdf))
     }
 
@@ -78,14 +78,14 @@ impl<const N: usize> Method for Fanlight<'_, N> {
     #[inline]
     fn pdf(&self, x: &ShadingPoint, drawn: &Drawn) -> f64 {
         if self.layered {
-            return f64::from(self.sampler.pdf_direction(x, drawn.direction));
+            return f64::from(self.sampler.at(x).pdf_direction(drawn.direction));
         }
-        let hit = Hit { triangle: self.scene.lights[drawn.light].id, barycentrics: drawn.barycentrics };
-        f64::from(self.sampler.pdf(x, &hit))
+        let hit = Hit::new(self.scene.lights[drawn.light].id, drawn.barycentrics);
+        f64::from(self.sampler.at(x).pdf(&hit))
     }
 
     fn pmfs(&self, x: &ShadingPoint, wanted: &dyn Fn(usize) -> bool) -> Option<Vec<f64>> {
-        let pmf = |l: usize| if wanted(l) { self.sampler.pmf(x, self.scene.lights[l].id) } else { 0.0 };
+        let pmf = |l: usize| if wanted(l) { self.sampler.at(x).pmf(self.scene.lights[l].id) } else { 0.0 };
         Some((0..self.scene.lights.len()).map(|l| f64::from(pmf(l))).collect())
     }
 

@@ -121,10 +121,9 @@ fn relative_variance(x: &ShadingPoint, texels: &[f32], sampler: Option<&LightSam
         let q = match sampler {
             None => weight / total,
             Some(sampler) => {
-                let hit =
-                    Hit { triangle: TriangleId { mesh: 0, triangle: 0 }, barycentrics: barycentrics.map(|b| b as f32) };
+                let hit = Hit::new(TriangleId::new(MeshId::from_index(0), 0), barycentrics.map(|b| b as f32));
                 // Per solid angle; what a cell has of the triangle's area is half of its share of all cells.
-                let per_area = f64::from(sampler.pdf(x, &hit)) * to.z.abs() / (distance2 * distance2.sqrt());
+                let per_area = f64::from(sampler.at(x).pdf(&hit)) * to.z.abs() / (distance2 * distance2.sqrt());
                 per_area * 0.5 / f64::from(CELLS * CELLS)
             }
         };

@@ -75,7 +75,7 @@ fn the_bounds_hold_every_direction_of_the_cone() {
             assert_eq!(estimate.value > 0.0, bounds.max > 0.0);
             assert_eq!(estimate.is_constant, bounds.min >= CONSTANT_RATIO * bounds.max);
             for _ in 0..20 {
-                let radiance = view.radiance(inside(axis, radius, &mut pcg)).min(view.parts().header.cap);
+                let radiance = view.radiance(inside(axis, radius, &mut pcg)).min(view.header.cap);
                 assert!(bounds.min <= radiance && radiance <= bounds.max, "{axis} {radius}: {radiance}");
             }
         }

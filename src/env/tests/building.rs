@@ -80,7 +80,7 @@ fn equal_area_flux_is_kept() {
 fn a_power_of_two_is_taken_as_it_is() {
     let image = noise(1024, 1);
     let environment = Environment::from_equal_area(32, &image, Filter::Nearest).unwrap();
-    assert_eq!(environment.as_view().parts().means[341..], image);
+    assert_eq!(environment.as_view().means[341..], image);
     for y in 0..32 {
         for x in 0..32 {
             let point = (glam::Vec2::new(x as f32, y as f32) + 0.5) / 32.0;
@@ -112,7 +112,7 @@ fn lit_places_stay_lit_and_all_others_black() {
                         assert!(e.radiance(direction) > 0.0, "{x}, {y}: {u}, {v}");
                     }
                     // No texel is lit that does not overlap.
-                    let lit = e.as_view().parts().means[(size * size - 1) / 3..].iter().filter(|&&v| v > 0.0).count();
+                    let lit = e.as_view().means[(size * size - 1) / 3..].iter().filter(|&&v| v > 0.0).count();
                     let share = lat_long_mean(width, height, &one_lit(width, height, x, y), Filter::Nearest);
                     let texels = share * (size * size) as f64 * if reach > 0.0 { 4.0 } else { 1.0 };
                     assert!((lit as f64) < 3.0 * texels + 40.0 + 4.0 * (texels * 40.0).sqrt() + size as f64 / 4.0);
@@ -162,9 +162,9 @@ fn pixels_are_where_the_convention_says() {
 fn levels_hold_what_is_below_them() {
     for environment in zoo() {
         let view = environment.as_view();
-        let finest = view.parts().header.depth;
-        let cap = view.parts().header.cap;
-        let filtered = view.parts().filtered_means;
+        let finest = view.header.depth;
+        let cap = view.header.cap;
+        let filtered = view.filtered;
         for depth in 0..=finest {
             let (size, below) = (1_u32 << depth, 1_u32 << (finest - depth));
             for (y, x) in (0..size).flat_map(|y| (0..size).map(move |x| (y, x))) {
@@ -201,14 +201,14 @@ fn uniform_images_and_constants_cost_nothing() {
     ];
     for environment in environments {
         assert!(environment.is_constant());
-        assert_eq!(environment.as_view().parts().means, [0.3]);
+        assert_eq!(environment.as_view().means, [0.3]);
         assert_eq!((environment.mean(), environment.max(), environment.size()), (0.3, 0.3, 1));
         assert!((environment.texel_solid_angle() - 2.0 * TAU).abs() < 1e-5);
     }
     // A region keeps its value exactly although texels and cells do not line up.
     let image: Vec<f32> = (0..50 * 30).map(|i| if i < 50 * 20 { 0.3 } else { 0.7 }).collect();
     let environment = Environment::from_lat_long(50, 30, &image, Filter::Bilinear).unwrap();
-    let mixed = environment.as_view().parts().means[(64 * 64 - 1) / 3..].iter().filter(|&&v| v != 0.3 && v != 0.7);
+    let mixed = environment.as_view().means[(64 * 64 - 1) / 3..].iter().filter(|&&v| v != 0.3 && v != 0.7);
     assert!(mixed.count() < 64 * 64 / 5);
 }
 
@@ -216,8 +216,7 @@ fn uniform_images_and_constants_cost_nothing() {
 fn memory_is_in_bounds() {
     let environment = Environment::from_equal_area(1024, &noise(1 << 20, 1), Filter::Nearest).unwrap();
     let view = environment.as_view();
-    let bytes =
-        size_of_val(view.parts().means) + size_of_val(view.parts().ranges) + size_of_val(view.parts().filtered_means);
+    let bytes = size_of_val(view.means) + size_of_val(view.ranges) + size_of_val(view.filtered);
     assert!(bytes <= 16_000_000, "{bytes}");
 }
 
@@ -231,9 +230,7 @@ fn extremes_of_brightness() {
                 .unwrap();
         assert!(environment.mean() > 0.0 && environment.mean().is_finite());
         let view = environment.as_view();
-        assert!(
-            view.parts().means.iter().zip(view.parts().filtered_means).all(|(a, b)| a.is_finite() && b.is_finite())
-        );
+        assert!(view.means.iter().zip(view.filtered).all(|(a, b)| a.is_finite() && b.is_finite()));
         let sample = environment.sample([0.3, 0.6]).unwrap();
         assert!(sample.pdf.is_finite() && sample.pdf > 0.0 && sample.radiance >= 1e-30);
         let constant = Environment::constant(value).unwrap();

@@ -2,16 +2,24 @@
 
 use super::*;
 use crate::env::features::FeatureLimits;
-use crate::env::{BrightFeature, EnvironmentHeader, EnvironmentImage, EnvironmentParts, EnvironmentView, FeatureTexel};
+use crate::env::view::EnvironmentHeader;
+use crate::env::{BrightFeature, EnvironmentImage, EnvironmentView, FeatureTexel};
+use crate::error::Error;
 use crate::warp::Variate;
+
+/// An environment that came from elsewhere.
+fn checked(view: EnvironmentView<'_>) -> Result<EnvironmentView<'_>, Error> {
+    view.validate()?;
+    Ok(view)
+}
 
 #[test]
 fn parts_make_the_same_environment() {
     for environment in zoo().into_iter().chain([Environment::constant(0.0).unwrap()]) {
         let view = environment.as_view();
-        let header: Vec<u8> = bytemuck::bytes_of(&view.parts().header).to_vec();
+        let header: Vec<u8> = bytemuck::bytes_of(&view.header).to_vec();
         let header = bytemuck::pod_read_unaligned(&header);
-        let again = EnvironmentView::from_parts(EnvironmentParts { header, ..view.parts() }).unwrap();
+        let again = checked(EnvironmentView { header, ..view }).unwrap();
         assert_eq!(again.sample([0.3, 0.7]), view.sample([0.3, 0.7]));
     }
 }
@@ -20,12 +28,12 @@ fn parts_make_the_same_environment() {
 fn parts_that_do_not_fit_are_refused() {
     let environment = Environment::from_equal_area(16, &noise(256, 1), Filter::Nearest).unwrap();
     let view = environment.as_view();
-    let parts = view.parts();
-    let EnvironmentParts { means, ranges, filtered_means: filtered, .. } = parts;
+    let parts = view;
+    let EnvironmentView { means, ranges, filtered, .. } = parts;
     let check = |f: &dyn Fn(&mut EnvironmentHeader)| {
         let mut header = parts.header;
         f(&mut header);
-        EnvironmentView::from_parts(EnvironmentParts { header, ..parts }).is_err()
+        checked(EnvironmentView { header, ..parts }).is_err()
     };
     assert!(!check(&|_| ()));
     assert!(check(&|h| h.depth = 3));
@@ -35,11 +43,11 @@ fn parts_that_do_not_fit_are_refused() {
     assert!(check(&|h| h.max = f32::NAN));
     assert!(check(&|h| h.rotation[0][0] = 0.9));
     assert!(check(&|h| h.rotation[1][1] = f32::NAN));
-    assert!(EnvironmentView::from_parts(EnvironmentParts { means: &means[1..], ..parts }).is_err());
-    assert!(EnvironmentView::from_parts(EnvironmentParts { ranges: &ranges[1..], ..parts }).is_err());
-    assert!(EnvironmentView::from_parts(EnvironmentParts { filtered_means: &filtered[1..], ..parts }).is_err());
-    let refused = |means: &[f32], ranges: &[[f32; 2]], filtered_means: &[f32]| {
-        EnvironmentView::from_parts(EnvironmentParts { means, ranges, filtered_means, ..parts }).is_err()
+    assert!(checked(EnvironmentView { means: &means[1..], ..parts }).is_err());
+    assert!(checked(EnvironmentView { ranges: &ranges[1..], ..parts }).is_err());
+    assert!(checked(EnvironmentView { filtered: &filtered[1..], ..parts }).is_err());
+    let refused = |means: &[f32], ranges: &[[f32; 2]], filtered: &[f32]| {
+        checked(EnvironmentView { means, ranges, filtered, ..parts }).is_err()
     };
     for value in [f32::NAN, f32::INFINITY, -1.0, 1e31] {
         for at in 0..means.len() {
@@ -57,12 +65,12 @@ fn parts_that_do_not_fit_are_refused() {
 }
 
 /// Changes the features of an environment, and says whether the result is refused.
-fn is_refused(parts: EnvironmentParts<'_>, change: impl Fn(&mut BrightFeature, &mut [FeatureTexel])) -> bool {
+fn is_refused(parts: EnvironmentView<'_>, change: impl Fn(&mut BrightFeature, &mut [FeatureTexel])) -> bool {
     let mut features = parts.features.to_vec();
     let mut feature_texels = parts.feature_texels.to_vec();
     change(&mut features[0], &mut feature_texels);
-    let parts = EnvironmentParts { features: &features, feature_texels: &feature_texels, ..parts };
-    EnvironmentView::from_parts(parts).is_err()
+    let parts = EnvironmentView { features: &features, feature_texels: &feature_texels, ..parts };
+    checked(parts).is_err()
 }
 
 #[test]
@@ -71,7 +79,7 @@ fn features_that_cannot_be_sampled_are_refused() {
     image[15 * 64 + 41] = 3.0;
     let environment = Environment::from_equal_area(64, &image, Filter::Nearest).unwrap();
     let view = environment.as_view();
-    let parts = view.parts();
+    let parts = view;
     assert_eq!((parts.features.len(), parts.feature_texels.len()), (1, 2));
     assert!(!is_refused(parts, |_, _| ()));
     for value in [f32::NAN, f32::INFINITY, -1.0, 1e31] {
@@ -101,13 +109,13 @@ fn features_that_cannot_be_sampled_are_refused() {
     assert!(is_refused(parts, |_, texels| texels[1].texel = 64 * 64));
     assert!(is_refused(parts, |_, texels| texels.swap(0, 1)));
     let features = [parts.features[0]; 9];
-    assert!(EnvironmentView::from_parts(EnvironmentParts { features: &features, ..parts }).is_err());
-    assert!(EnvironmentView::from_parts(EnvironmentParts { features: &[], ..parts }).is_err());
-    assert!(EnvironmentView::from_parts(EnvironmentParts { features: &[], feature_texels: &[], ..parts }).is_err());
-    assert!(EnvironmentView::from_parts(EnvironmentParts { feature_texels: &[], ..parts }).is_err());
+    assert!(checked(EnvironmentView { features: &features, ..parts }).is_err());
+    assert!(checked(EnvironmentView { features: &[], ..parts }).is_err());
+    assert!(checked(EnvironmentView { features: &[], feature_texels: &[], ..parts }).is_err());
+    assert!(checked(EnvironmentView { feature_texels: &[], ..parts }).is_err());
     for cap in [f32::NAN, f32::INFINITY, -1.0, 0.0, 1.5] {
         let header = EnvironmentHeader { cap, ..parts.header };
-        assert!(EnvironmentView::from_parts(EnvironmentParts { header, ..parts }).is_err(), "{cap}");
+        assert!(checked(EnvironmentView { header, ..parts }).is_err(), "{cap}");
     }
 }
 
@@ -130,7 +138,7 @@ fn environments_of_other_limits_load() {
         let image = EnvironmentImage::equal_area(64, &image).filter(Filter::Nearest);
         let environment = Environment::with_limits(&image, &limits).unwrap();
         different += u32::from(environment != default);
-        let view = EnvironmentView::from_parts(environment.as_view().parts()).unwrap();
+        let view = checked(environment.as_view()).unwrap();
         let mut pcg = Pcg32::new(1, 7);
         for i in 0..2000 {
             let sample = view.sample([pcg.next_f32(), pcg.next_f32()]).unwrap();

@@ -116,14 +116,14 @@ fn texels_are_chosen_in_proportion_to_their_radiance() {
     for environment in zoo() {
         let view = environment.as_view();
         let size = view.size() as usize;
-        let texels = &view.parts().means[view.parts().means.len() - size * size..];
+        let texels = &view.means[view.means.len() - size * size..];
         let total: f64 = texels.iter().map(|&v| f64::from(v)).sum();
         let expected: Vec<f64> = texels.iter().map(|&v| f64::from(v) / total * f64::from(n)).collect();
         let mut observed = vec![0.0; size * size];
         let mut inside = [0.0; 64];
         for _ in 0..n {
             let sample = view.sample([pcg.next_f32(), pcg.next_f32()]).unwrap();
-            let local = crate::env::rotation::to_local(&view.parts().header.rotation, sample.direction);
+            let local = crate::env::rotation::to_local(&view.header.rotation, sample.direction);
             let point = crate::warp::equal_area::sphere_to_square(local) * size as f32;
             let (x, y) = (point.x as usize, point.y as usize);
             observed[y * size + x] += 1.0;

@@ -10,6 +10,7 @@ use crate::warp::{self, Variate};
 
 /// How far a light tree is split.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Splitting {
     /// From 0 (never) to 1 (always): a node is split where `(1 + σ)^-1/4` lies below, with σ the standard deviation
     /// of its contribution relative to the whole tree's.
@@ -17,6 +18,14 @@ pub struct Splitting {
     /// Levels of the tree, counted from the root, that may be split. A tree of arity `N` gives at most
     /// `N^levels` samples.
     pub levels: u32,
+}
+
+impl Splitting {
+    /// Returns a splitting with this threshold, in `[0, 1]`, and number of levels.
+    #[must_use]
+    pub const fn new(threshold: f32, levels: u32) -> Self {
+        Self { threshold, levels }
+    }
 }
 
 impl Default for Splitting {

@@ -51,8 +51,8 @@ pub extern "C" fn main() -> i32 {
     let (mut portal, mut emitter) = (0, 0);
     for i in 0..SAMPLES {
         let u = [uniform(3 * i), uniform(3 * i + 1), uniform(3 * i + 2)];
-        let Some(sample) = sampler.sample(&on_floor, u) else { continue };
-        let pdf = sampler.pdf(&on_floor, &sample.hit);
+        let Some(sample) = sampler.at(&on_floor).sample(u) else { continue };
+        let pdf = sampler.at(&on_floor).pdf(&sample.hit);
         assert!((pdf - sample.pdf).abs() <= 1e-5 * sample.pdf, "sampled with {}, found {pdf}", sample.pdf);
         if sample.hit.triangle.mesh == 0 { portal += 1 } else { emitter += 1 }
     }

@@ -1,7 +1,7 @@
 //! Integrals of a density over triangles, from the outside: nothing is known but values of `pdf` at points, and that
 //! the density per area is constant over dyadic barycentric cells of a depth that is not known.
 
-use fanlight::{Hit, LightSample, ShadingPoint, TriangleId};
+use fanlight::{Hit, LightSample, MeshId, ShadingPoint, TriangleId};
 use glam::DVec3;
 
 use super::scene::Scene;
@@ -14,7 +14,7 @@ const DEEPEST: u32 = 13;
 const STEP: f64 = 1.0 / (1 << 24) as f64;
 
 pub(crate) fn id((mesh, triangle): (usize, usize)) -> TriangleId {
-    TriangleId { mesh: mesh as u32, triangle: triangle as u32 }
+    TriangleId::new(MeshId::from_index(mesh as u32), triangle as u32)
 }
 
 /// From here on cells are so small that four equal values settle them.
@@ -57,7 +57,7 @@ impl<'a> OnTriangle<'a> {
     fn density(&self, b: [f64; 2]) -> f64 {
         // Next to the shading point, rounding would be felt.
         let barycentrics = b.map(|b| ((b / STEP).round() * STEP) as f32);
-        let pdf = (self.pdf)(&Hit { triangle: self.id, barycentrics });
+        let pdf = (self.pdf)(&Hit::new(self.id, barycentrics));
         if pdf == 0.0 {
             return 0.0;
         }
@@ -144,7 +144,7 @@ pub(crate) fn probes(scene: &Scene, samples: &[LightSample]) -> Vec<Vec<Vec<[f32
     let mut probes: Vec<_> = scene.meshes.iter().map(|mesh| vec![Vec::new(); mesh.indices.len()]).collect();
     for sample in samples {
         let hit = sample.hit;
-        probes[hit.triangle.mesh as usize][hit.triangle.triangle as usize].push(hit.barycentrics);
+        probes[hit.triangle.mesh.index() as usize][hit.triangle.triangle as usize].push(hit.barycentrics);
     }
     probes
 }

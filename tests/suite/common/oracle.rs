@@ -14,6 +14,7 @@ pub(crate) fn cosine(receiver: &Receiver, direction: DVec3) -> f64 {
         Receiver::Surface(normal) => normal.as_dvec3().dot(direction).max(0.0),
         Receiver::Transmissive(normal) => normal.as_dvec3().dot(direction).abs(),
         Receiver::Volume => 1.0,
+        _ => panic!("the oracle does not know this receiver"),
     }
 }
 

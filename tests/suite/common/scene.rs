@@ -1,8 +1,7 @@
 //! Scenes as plain descriptions, from which a sampler is built and an oracle computes.
 
 use fanlight::{
-    Environment, Filter, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver, ShadingPoint, Sides, Texture,
-    Weight, Wrap,
+    Arity, Environment, Filter, Illumination, LightSampler, Mesh, Receiver, ShadingPoint, Sides, Texture, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -220,9 +219,9 @@ impl Scene {
         environment.and_then(|e| e.with_rotation(self.rotation)).expect("the environment is valid")
     }
 
-    pub(crate) fn build<const N: usize>(&self) -> LightSampler<N> {
-        let mut builder = LightSamplerBuilder::<N>::new();
-        builder.environment(self.environment()).illumination(self.illumination);
+    pub(crate) fn build(&self, arity: Arity) -> LightSampler {
+        let builder = LightSampler::builder().environment(self.environment()).illumination(self.illumination);
+        let mut builder = builder.arity(arity);
         let textures: Vec<_> = self.images.iter().map(|image| builder.add_texture(image.texture())).collect();
         for light in &self.meshes {
             let mesh = if light.portal { Mesh::portal } else { Mesh::emitter };
@@ -248,5 +247,5 @@ pub(crate) fn random_point(pcg: &mut Pcg32, kind: usize) -> ShadingPoint {
     let position = 2.0 * Vec3::from(pcg.cube()) - 0.5;
     let normal = pcg.direction();
     let receiver = [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][kind % 3];
-    ShadingPoint { position, receiver }
+    ShadingPoint::new(position, receiver)
 }

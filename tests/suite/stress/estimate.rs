@@ -125,7 +125,7 @@ fn crossings(row: &Row, at: &dyn Point, x: &ShadingPoint, direction: DVec3) -> V
         let [a, b, c] = vertices;
         let distance = |[b1, b2]: [f64; 2]| (a * (1.0 - b1 - b2) + b * b1 + c * b2).length();
         let near = [b1, b2].map(|b| (b * 16_777_216.0).round() / 16_777_216.0);
-        let pdf = f64::from(at.pdf(&Hit { triangle: id((m, t)), barycentrics: near.map(|b| b as f32) }));
+        let pdf = f64::from(at.pdf(&Hit::new(id((m, t)), near.map(|b| b as f32))));
         let sent = if row.ones { 1.0 } else { oracle::sent(&row.scene, m, t, [b1, b2], direction) };
         found.push(Crossing {
             brings: sent * oracle::cosine(&x.receiver, direction),
@@ -158,7 +158,7 @@ fn statistics(values: [f64; SETS]) -> [f64; 2] {
 
 /// What the point of a sample sends, times the cosine.
 fn contribution(row: &Row, x: &ShadingPoint, sample: &LightSample) -> f64 {
-    let (m, t) = (sample.hit.triangle.mesh as usize, sample.hit.triangle.triangle as usize);
+    let (m, t) = (sample.hit.triangle.mesh.index() as usize, sample.hit.triangle.triangle as usize);
     let b = sample.hit.barycentrics.map(f64::from);
     let [v0, v1, v2] = oracle::relative(&row.scene.meshes[m], t, x);
     let direction = (v0 * (1.0 - b[0] - b[1]) + v1 * b[0] + v2 * b[1]).normalize();

@@ -65,7 +65,7 @@ pub(crate) fn some(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSam
     let some: Vec<_> = kept.iter().take(SOME).map(|sample| sample.hit.triangle).collect();
     let (mut ratio, mut variance) = (0.0, 0.0);
     for triangle in &some {
-        let triangle = (triangle.mesh as usize, triangle.triangle as usize);
+        let triangle = (triangle.mesh.index() as usize, triangle.triangle as usize);
         let pmf = f64::from(at.pmf(id(triangle)));
         let over = |depth: usize| over_triangle(row, at, x, triangle, [depth, cells], ENOUGH * pmf, &[]);
         let ((coarse, _), (fine, error)) = (over(2), over(3));

@@ -167,7 +167,7 @@ fn over_hits(row: &Row, at: &dyn Point, x: &ShadingPoint, direction: DVec3) -> O
             return None;
         }
         if least > 0.0 {
-            sum += f64::from(at.pdf(&Hit { triangle: id((m, t)), barycentrics: [b1 as f32, b2 as f32] }));
+            sum += f64::from(at.pdf(&Hit::new(id((m, t)), [b1 as f32, b2 as f32])));
         }
     }
     Some(sum)

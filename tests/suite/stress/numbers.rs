@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use crate::common::density::id;
 use crate::common::hostile::random_scene;
-use crate::common::lights::{ARITIES, Lights, build};
+use crate::common::lights::{ARITIES, build};
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{LightMesh, Scene, random_point};
 use crate::common::statistics::chi_square;
@@ -41,7 +41,7 @@ fn any_numbers_give_samples_with_their_density() {
 }
 
 /// How often each triangle is drawn, and the probability of each.
-fn histogram(scene: &Scene, lights: &dyn Lights, x: &ShadingPoint, samples: usize) -> [Vec<f64>; 2] {
+fn histogram(scene: &Scene, lights: &LightSampler, x: &ShadingPoint, samples: usize) -> [Vec<f64>; 2] {
     let at = lights.at(x);
     let mut pcg = Pcg32::new(3, 65);
     let mut observed = vec![0.0; scene.triangles().count()];
@@ -66,7 +66,7 @@ fn lights_of_all_sizes_are_chosen_with_their_probability() {
     for arities in [(4, 4), (8, 4), (16, 4)] {
         let lights = build(&scene, arities);
         let x = ShadingPoint::volume(Vec3::new(0.0, 0.0, 1e-9));
-        let [observed, expected] = histogram(&scene, &*lights, &x, 500_000);
+        let [observed, expected] = histogram(&scene, &lights, &x, 500_000);
         let (p, dump) = chi_square(&observed, &expected);
         assert!(p > SIGNIFICANCE, "{arities:?}: p = {p}\n{dump}");
     }
@@ -93,10 +93,10 @@ fn leaves_of_a_large_tree_are_chosen_with_their_probability() {
     let mut pcg = Pcg32::new(5, 66);
     let count = 1_000_000;
     let scene = Scene::new("cloud", vec![LightMesh::soup(&mut pcg, count, 0.01).two_sided()]);
-    let lights = build(&scene, (8, 4));
+    let lights = build(&scene, Arity::Eight);
     let x = ShadingPoint::volume(Vec3::new(0.5, 0.5, 40.0));
     let samples = 8 * count;
-    let [observed, expected] = histogram(&scene, &*lights, &x, samples);
+    let [observed, expected] = histogram(&scene, &lights, &x, samples);
     let (p, dump) = chi_square(&observed, &expected);
     let mut ends = vec![0.0];
     expected.iter().for_each(|share| ends.push(ends[ends.len() - 1] + share));

@@ -4,7 +4,7 @@ use super::*;
 use crate::blas::barycentric::{Lattice, child};
 use crate::blas::node::{LEAF, averages, below, end, mean};
 use crate::blas::validate::{validate, validate_roots};
-use crate::error::Kind;
+use crate::error::ErrorKind;
 use crate::record::Filter;
 use crate::testing::Pcg32;
 
