@@ -1,10 +1,10 @@
 //! The same code compiled for wider vector registers, chosen when the program runs.
 //!
-//! A [`Work`] is plain code over arrays, which a compiler turns into vectors of the width that
+//! A [`Kernel`] is plain code over arrays, which a compiler turns into vectors of the width that
 //! it may use; products and sums are never fused, so the results are the same bits at every level.
 
 /// Code that is worth compiling for each level.
-pub(crate) trait Work {
+pub(crate) trait Kernel {
     /// What comes out.
     type Output;
 
@@ -14,10 +14,10 @@ pub(crate) trait Work {
 
 /// Instructions that this machine has: only asking the machine makes one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Level(Set);
+pub(crate) struct InstructionSet(Extension);
 
 #[derive(Clone, Copy, Debug)]
-enum Set {
+enum Extension {
     /// What the whole program is compiled for.
     Baseline,
     /// 256-bit vectors.
@@ -28,31 +28,31 @@ enum Set {
     Avx512,
 }
 
-impl Level {
+impl InstructionSet {
     /// The widest that this machine has. Cheap, but not free: ask once a traversal.
     #[inline(always)]
     pub(crate) fn best() -> Self {
         #[cfg(all(target_arch = "x86_64", feature = "std"))]
         {
-            if Set::Avx512.is_available() {
-                return Self(Set::Avx512);
+            if Extension::Avx512.is_available() {
+                return Self(Extension::Avx512);
             }
-            if Set::Avx2.is_available() {
-                return Self(Set::Avx2);
+            if Extension::Avx2.is_available() {
+                return Self(Extension::Avx2);
             }
         }
-        Self(Set::Baseline)
+        Self(Extension::Baseline)
     }
 
     /// All that this machine has.
     #[cfg(test)]
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         [
-            Set::Baseline,
+            Extension::Baseline,
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            Set::Avx2,
+            Extension::Avx2,
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            Set::Avx512,
+            Extension::Avx512,
         ]
         .into_iter()
         .filter(|set| set.is_available())
@@ -65,20 +65,20 @@ impl Level {
         all(target_arch = "x86_64", feature = "std"),
         expect(unsafe_code, reason = "the machine was asked whether it has these instructions")
     )]
-    pub(crate) fn run<W: Work>(self, work: W) -> W::Output {
+    pub(crate) fn run<W: Kernel>(self, work: W) -> W::Output {
         match self.0 {
-            Set::Baseline => work.run(),
+            Extension::Baseline => work.run(),
             // SAFETY: a level is made only where the machine has it.
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            Set::Avx2 => unsafe { with_avx2(work) },
+            Extension::Avx2 => unsafe { with_avx2(work) },
             // SAFETY: as before.
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            Set::Avx512 => unsafe { with_avx512(work) },
+            Extension::Avx512 => unsafe { with_avx512(work) },
         }
     }
 }
 
-impl Set {
+impl Extension {
     #[inline(always)]
     #[cfg_attr(not(all(target_arch = "x86_64", feature = "std")), expect(dead_code, reason = "only tests ask"))]
     fn is_available(self) -> bool {
@@ -94,13 +94,13 @@ impl Set {
 
 #[cfg(all(target_arch = "x86_64", feature = "std"))]
 #[target_feature(enable = "avx2")]
-fn with_avx2<W: Work>(work: W) -> W::Output {
+fn with_avx2<W: Kernel>(work: W) -> W::Output {
     work.run()
 }
 
 #[cfg(all(target_arch = "x86_64", feature = "std"))]
 #[target_feature(enable = "avx2,avx512f,avx512vl")]
-fn with_avx512<W: Work>(work: W) -> W::Output {
+fn with_avx512<W: Kernel>(work: W) -> W::Output {
     work.run()
 }
 

@@ -190,7 +190,7 @@ pub(super) struct Scene<'a> {
     sends: bool,
 }
 
-impl tlas::Scene for Scene<'_> {
+impl tlas::LeafOracle for Scene<'_> {
     #[inline(always)]
     fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N] {
         let mean = self.environment.mean_without_suns();

@@ -8,7 +8,7 @@ use super::lights::{LightSampler, LightSamplerView, Scene};
 use super::sample::variates;
 use crate::record::{LightSample, ShadingPoint};
 use crate::simd::prefetch;
-use crate::tlas::{TURNS, Walk};
+use crate::tlas::{Descent, TURNS};
 use crate::warp::Variate;
 
 impl<const N: usize, const M: usize> LightSampler<N, M> {
@@ -36,15 +36,15 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     }
 
     fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        let mut walks = SmallVec::<[Walk<Scene<'_>>; TURNS]>::new();
+        let mut walks = SmallVec::<[Descent<Scene<'_>>; TURNS]>::new();
         let mut points = SmallVec::<[[Variate; 2]; TURNS]>::new();
         for (x, u) in queries {
             let [choice, point @ ..] = variates(*u);
-            walks.push(Walk::new(x, self.scene(x), choice));
+            walks.push(Descent::new(x, self.scene(x), choice));
             points.push(point);
         }
         self.tlas.sample_many(&mut walks);
-        for (leaf, _) in walks.iter().filter_map(Walk::leaf) {
+        for (leaf, _) in walks.iter().filter_map(Descent::leaf) {
             prefetch(&self.triangles[leaf as usize]);
         }
         let Some((first, _)) = queries.first() else { return };

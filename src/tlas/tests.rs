@@ -4,14 +4,14 @@ use alloc::vec::Vec;
 
 use glam::Vec3;
 
-use super::descend::{Draw, Follow, Walk};
 use super::node::{Child, TlasView};
-use super::ray::{Crossed, Met};
-use super::{Scene, Splitting, Tlas};
+use super::walk::descend::{Descent, PmfWalk, SampleWalk};
+use super::walk::ray::{Crossed, Met};
+use super::{LeafOracle, Splitting, Tlas};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::record::ShadingPoint;
-use crate::simd::Level;
+use crate::simd::InstructionSet;
 use crate::testing::Pcg32;
 use crate::warp::{Variate, seed};
 
@@ -28,7 +28,7 @@ pub(super) fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
 /// Leaves are all visible, and portals show the same in every direction.
 struct Open;
 
-impl Scene for Open {
+impl LeafOracle for Open {
     fn radiances<const N: usize>(&self, _centers: &[[f32; N]; 3], _radii: &[f32; N], _set: u32) -> [f32; N] {
         [1.0; N]
     }
@@ -41,7 +41,7 @@ impl Scene for Open {
 /// Of the leaves in doubt only those with odd numbers are visible.
 struct Odd;
 
-impl Scene for Odd {
+impl LeafOracle for Odd {
     fn radiances<const N: usize>(&self, _centers: &[[f32; N]; 3], _radii: &[f32; N], _set: u32) -> [f32; N] {
         [1.0; N]
     }
@@ -80,7 +80,7 @@ fn shading_point(i: usize, pcg: &mut Pcg32) -> ShadingPoint {
 }
 
 /// Probability of ending below a node where every weight is zero.
-fn dead_mass<const N: usize>(tlas: &TlasView<'_, N>, node: usize, x: &ShadingPoint, scene: &impl Scene) -> f64 {
+fn dead_mass<const N: usize>(tlas: &TlasView<'_, N>, node: usize, x: &ShadingPoint, scene: &impl LeafOracle) -> f64 {
     let weights = tlas.nodes[node].weigh(x, scene);
     if weights == [0.0; N] {
         return 1.0;
@@ -94,7 +94,7 @@ fn dead_mass<const N: usize>(tlas: &TlasView<'_, N>, node: usize, x: &ShadingPoi
     (0..N).map(below).sum()
 }
 
-fn probabilities_sum_to_one<const N: usize>(scene: &impl Scene) {
+fn probabilities_sum_to_one<const N: usize>(scene: &impl LeafOracle) {
     let mut pcg = Pcg32::new(3, 1);
     for n in [2, 3, 17, 100, 3000] {
         let (tlas, _) = build::<N>(&cloud(n, &mut pcg));
@@ -155,22 +155,22 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let x = &shading_point(i, pcg);
         let x = &ShadingPoint { position: x.position * scale, ..*x };
         let u = pcg.next_f32();
-        let draw = |level: Level| {
-            let drawn = level.run(Draw { tlas, walk: Walk::new(x, &Odd, Variate::new(u, seed(&[u]))) });
-            let pmf = drawn.map(|(leaf, _)| level.run(Follow { tlas, leaf, x, scene: &Odd, first: None }).to_bits());
+        let draw = |level: InstructionSet| {
+            let drawn = level.run(SampleWalk { tlas, walk: Descent::new(x, &Odd, Variate::new(u, seed(&[u]))) });
+            let pmf = drawn.map(|(leaf, _)| level.run(PmfWalk { tlas, leaf, x, scene: &Odd, first: None }).to_bits());
             (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), pmf)
         };
-        let mut all = Level::all().map(draw);
+        let mut all = InstructionSet::all().map(draw);
         let first = all.next();
         found += usize::from(first.is_some_and(|(drawn, ..)| drawn.is_some()));
         assert!(all.all(|other| Some(other) == first));
         let (node, origin, axis) = (&tlas.nodes[i % tlas.nodes.len()], x.position, pcg.direction());
         let inverse = axis.recip();
-        let lanes = |level: Level| {
+        let lanes = |level: InstructionSet| {
             let crossed = level.run(Crossed { node, origin, inverse });
             (crossed, level.run(Met { node, origin, axis, cone: [0.6, 0.8] }))
         };
-        let mut all = Level::all().map(lanes);
+        let mut all = InstructionSet::all().map(lanes);
         let first = all.next();
         assert!(all.all(|other| Some(other) == first));
     }

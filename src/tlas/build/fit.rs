@@ -4,9 +4,9 @@
 
 use smallvec::SmallVec;
 
-use super::node::{Child, Node, Spread, Tlas};
 use crate::bounds::{LightBounds, Moments};
 use crate::parallel;
+use crate::tlas::node::{Child, Node, Spread, Tlas};
 
 /// A node and all nodes below it, which are neighbours in memory.
 struct Subtree<'a, const N: usize> {

@@ -8,14 +8,14 @@ use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::record::{Receiver, ShadingPoint};
 use crate::testing::Pcg32;
-use crate::tlas::Scene;
+use crate::tlas::LeafOracle;
 use crate::tlas::node::{Child, Node, TlasView};
 use crate::tlas::tests::build;
 
 /// Everything is visible.
 struct Open;
 
-impl Scene for Open {
+impl LeafOracle for Open {
     fn radiances<const N: usize>(&self, _centers: &[[f32; N]; 3], _radii: &[f32; N], _set: u32) -> [f32; N] {
         [1.0; N]
     }

@@ -4,10 +4,10 @@ use core::f32::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec3};
 
-use super::node::{ALL, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, angle};
 use crate::math;
+use crate::tlas::node::{ALL, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
 
 /// Steps along the longest extent of a node. Fewer than a byte can count, as rounding moves centres and widens boxes.
 const BOX_STEPS: f64 = 253.0;

@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::importance::clamped_mean;
-use super::node::{Child, Node, TlasView};
+use crate::tlas::node::{Child, Node, TlasView};
 use crate::warp::{Variate, keep_possible, pick, pmf, sum};
 
 /// Of the spread of a cluster's normals, what counts as variance of a cosine.

@@ -1,16 +1,9 @@
-//! Binned build of a binary light tree by the surface area orientation heuristic (Conty Estevez and Kulla 2018,
-//! section 4.1), and of the wide tree that is made of it.
-
-use alloc::vec;
-use alloc::vec::Vec;
+//! Top-down build of a binary light tree by the surface area orientation heuristic (Conty Estevez and Kulla 2018,
+//! section 4.1).
 
 use super::bins::Extent;
 use super::cluster::Item;
-use super::collapse::collapse;
-use super::node::Tlas;
-
-use super::progress::{Cancelled, Progress, Report};
-use crate::bounds::LightBounds;
+use super::progress::Progress;
 use crate::parallel::{self, WORTHWHILE};
 
 /// Below this depth lights are split into equal halves, so that no input can make the tree deeper than this plus
@@ -28,27 +21,8 @@ pub(super) struct BinaryNode {
     pub(super) link: u32,
 }
 
-/// Arranges `count` lights, of which `light` tells the bounds, in a tree of arity `N`. Returns it with the lights in the
-/// order of its leaves; its nodes know no bounds until [`Tlas::fit`].
-pub(crate) fn build<const N: usize>(
-    count: usize,
-    light: &(impl Fn(u32) -> LightBounds + Sync),
-    report: Option<Report<'_>>,
-) -> Result<(Tlas<N>, Vec<u32>), Cancelled> {
-    if count == 0 {
-        return Ok((Tlas::default(), Vec::new()));
-    }
-    let progress = Progress::new(report, count);
-    let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
-    let mut binary = vec![BinaryNode::default(); 2 * count - 1];
-    subdivide(&mut items, &mut binary, 0, &progress);
-    progress.check()?;
-    drop(items);
-    Ok(collapse(&binary))
-}
-
 /// Builds the subtree over `items` into `nodes`, which holds exactly its `2 n - 1` places.
-fn subdivide(items: &mut [Item], nodes: &mut [BinaryNode], depth: u32, progress: &Progress<'_>) {
+pub(super) fn subdivide(items: &mut [Item], nodes: &mut [BinaryNode], depth: u32, progress: &Progress<'_>) {
     let count = items.len();
     let is_large = count >= WORTHWHILE;
     if is_large && progress.check().is_err() {

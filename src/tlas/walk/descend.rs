@@ -1,17 +1,17 @@
 //! From the root to a leaf, and from a leaf back to the root: the same weights decide both.
 
-use super::importance::{Scene, Sight};
-use super::node::{Child, Node, TlasView};
+use super::importance::{LeafOracle, ReceiverLanes};
 use crate::record::ShadingPoint;
-use crate::simd::{Level, Work, prefetch};
+use crate::simd::{InstructionSet, Kernel, prefetch};
+use crate::tlas::node::{Child, Node, TlasView};
 use crate::warp::{Variate, pick_wide, pmf_wide};
 
 /// Walks that take turns: enough to hide what one waits for, few enough to stay in the cache.
 pub(crate) const TURNS: usize = 8;
 
 /// A way down the tree, as far as it has got.
-pub(crate) struct Walk<S> {
-    sight: Sight,
+pub(crate) struct Descent<S> {
+    sight: ReceiverLanes,
     scene: S,
     u: Variate,
     node: u32,
@@ -21,11 +21,11 @@ pub(crate) struct Walk<S> {
     end: Option<Option<u32>>,
 }
 
-impl<S: Scene> Walk<S> {
+impl<S: LeafOracle> Descent<S> {
     /// From the root.
     #[inline(always)]
     pub(crate) fn new(x: &ShadingPoint, scene: S, u: Variate) -> Self {
-        Self { sight: Sight::new(x), scene, u, node: 0, pmf: 1.0, end: None }
+        Self { sight: ReceiverLanes::new(x), scene, u, node: 0, pmf: 1.0, end: None }
     }
 
     /// The leaf that was drawn, with its probability.
@@ -58,12 +58,12 @@ impl<S: Scene> Walk<S> {
 }
 
 /// One way down to a leaf.
-pub(super) struct Draw<'a, const N: usize, S> {
-    pub(super) tlas: &'a TlasView<'a, N>,
-    pub(super) walk: Walk<S>,
+pub(in crate::tlas) struct SampleWalk<'a, const N: usize, S> {
+    pub(in crate::tlas) tlas: &'a TlasView<'a, N>,
+    pub(in crate::tlas) walk: Descent<S>,
 }
 
-impl<const N: usize, S: Scene> Work for Draw<'_, N, S> {
+impl<const N: usize, S: LeafOracle> Kernel for SampleWalk<'_, N, S> {
     type Output = Option<(u32, f64)>;
 
     #[inline(always)]
@@ -77,12 +77,12 @@ impl<const N: usize, S: Scene> Work for Draw<'_, N, S> {
 
 /// Several ways down, one step each in turn, and each step in two halves: while one way waits for memory or for sums,
 /// the others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
-struct DrawMany<'a, const N: usize, S> {
+struct InterleavedWalks<'a, const N: usize, S> {
     tlas: &'a TlasView<'a, N>,
-    walks: &'a mut [Walk<S>],
+    walks: &'a mut [Descent<S>],
 }
 
-impl<const N: usize, S: Scene> Work for DrawMany<'_, N, S> {
+impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
     type Output = ();
 
     #[inline(always)]
@@ -105,24 +105,24 @@ impl<const N: usize, S: Scene> Work for DrawMany<'_, N, S> {
     }
 }
 
-/// The way back from a leaf: the probability that [`Draw`] takes it.
-pub(super) struct Follow<'a, const N: usize, S> {
-    pub(super) tlas: &'a TlasView<'a, N>,
-    pub(super) leaf: u32,
-    pub(super) x: &'a ShadingPoint,
-    pub(super) scene: &'a S,
+/// The way back from a leaf: the probability that [`SampleWalk`] takes it.
+pub(in crate::tlas) struct PmfWalk<'a, const N: usize, S> {
+    pub(in crate::tlas) tlas: &'a TlasView<'a, N>,
+    pub(in crate::tlas) leaf: u32,
+    pub(in crate::tlas) x: &'a ShadingPoint,
+    pub(in crate::tlas) scene: &'a S,
     /// Weights of the root, if they are known.
-    pub(super) first: Option<&'a [f32; N]>,
+    pub(in crate::tlas) first: Option<&'a [f32; N]>,
 }
 
-impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
+impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
     type Output = f64;
 
     #[inline(always)]
     fn run(self) -> f64 {
         // The way is short to find, but its nodes are far apart in memory.
         self.tlas.path(self.leaf).for_each(|(node, _)| prefetch(&self.tlas.nodes[node]));
-        let sight = Sight::new(self.x);
+        let sight = ReceiverLanes::new(self.x);
         let mut pmf = 1.0;
         // Not a fold, whose closure would be compiled for the baseline.
         for (node, lane) in self.tlas.path(self.leaf) {
@@ -136,25 +136,25 @@ impl<const N: usize, S: Scene> Work for Follow<'_, N, S> {
 }
 
 /// The weights of one node.
-struct Weigh<'a, const N: usize, S> {
+struct NodeWeights<'a, const N: usize, S> {
     node: &'a Node<N>,
     x: &'a ShadingPoint,
     scene: &'a S,
 }
 
-impl<const N: usize, S: Scene> Work for Weigh<'_, N, S> {
+impl<const N: usize, S: LeafOracle> Kernel for NodeWeights<'_, N, S> {
     type Output = [f32; N];
 
     #[inline(always)]
     fn run(self) -> [f32; N] {
-        self.node.weights(&Sight::new(self.x), self.scene)
+        self.node.weights(&ReceiverLanes::new(self.x), self.scene)
     }
 }
 
 impl<const N: usize> Node<N> {
     /// Weight of every child.
-    pub(super) fn weigh(&self, x: &ShadingPoint, scene: &impl Scene) -> [f32; N] {
-        Level::best().run(Weigh { node: self, x, scene })
+    pub(in crate::tlas) fn weigh(&self, x: &ShadingPoint, scene: &impl LeafOracle) -> [f32; N] {
+        InstructionSet::best().run(NodeWeights { node: self, x, scene })
     }
 }
 
@@ -164,62 +164,62 @@ impl<const N: usize> TlasView<'_, N> {
     pub(crate) fn sample(
         &self,
         x: &ShadingPoint,
-        scene: &impl Scene,
+        scene: &impl LeafOracle,
         first: Option<&[f32; N]>,
         u: Variate,
     ) -> Option<(u32, f64)> {
         let Some(root) = self.nodes.first() else { return self.single_leaf(scene).then_some((0, 1.0)) };
-        let mut walk = Walk::new(x, scene, u);
+        let mut walk = Descent::new(x, scene, u);
         if let Some(weights) = first {
             walk.choose(root, weights);
         }
-        Level::best().run(Draw { tlas: self, walk })
+        InstructionSet::best().run(SampleWalk { tlas: self, walk })
     }
 
     /// Draws a leaf below a node.
-    pub(super) fn sample_below(
+    pub(in crate::tlas) fn sample_below(
         &self,
         node: usize,
         x: &ShadingPoint,
-        scene: &impl Scene,
+        scene: &impl LeafOracle,
         u: Variate,
     ) -> Option<(u32, f64)> {
-        let walk = Walk { node: node as u32, ..Walk::new(x, scene, u) };
-        Level::best().run(Draw { tlas: self, walk })
+        let walk = Descent { node: node as u32, ..Descent::new(x, scene, u) };
+        InstructionSet::best().run(SampleWalk { tlas: self, walk })
     }
 
     /// As many calls of [`Self::sample`], of which each walk then holds what was drawn.
-    pub(crate) fn sample_many(&self, walks: &mut [Walk<impl Scene>]) {
+    pub(crate) fn sample_many(&self, walks: &mut [Descent<impl LeafOracle>]) {
         if self.nodes.is_empty() {
             for walk in walks {
                 walk.end = Some(self.single_leaf(&walk.scene).then_some(0));
             }
             return;
         }
-        Level::best().run(DrawMany { tlas: self, walks });
+        InstructionSet::best().run(InterleavedWalks { tlas: self, walks });
     }
 
     /// Probability with which [`Self::sample`] draws a leaf.
-    pub(crate) fn pmf(&self, leaf: u32, x: &ShadingPoint, scene: &impl Scene, first: Option<&[f32; N]>) -> f64 {
+    pub(crate) fn pmf(&self, leaf: u32, x: &ShadingPoint, scene: &impl LeafOracle, first: Option<&[f32; N]>) -> f64 {
         if self.nodes.is_empty() {
             return if self.single_leaf(scene) { 1.0 } else { 0.0 };
         }
-        Level::best().run(Follow { tlas: self, leaf, x, scene, first })
+        InstructionSet::best().run(PmfWalk { tlas: self, leaf, x, scene, first })
     }
 
     /// Weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
     /// energies; `None` for a tree without nodes.
-    pub(crate) fn first_weights(&self, x: &ShadingPoint, scene: &impl Scene) -> Option<[f32; N]> {
+    pub(crate) fn first_weights(&self, x: &ShadingPoint, scene: &impl LeafOracle) -> Option<[f32; N]> {
         self.nodes.first().map(|root| root.weigh(x, scene))
     }
 
     /// Nodes and lanes on the way from a leaf to the root.
-    pub(super) fn path(&self, leaf: u32) -> impl Iterator<Item = (usize, usize)> {
+    pub(in crate::tlas) fn path(&self, leaf: u32) -> impl Iterator<Item = (usize, usize)> {
         core::iter::successors(self.leaves[leaf as usize].get::<N>(), |&(node, _)| self.parents[node].get::<N>())
     }
 
     /// Whether the tree is a single leaf, and that leaf visible.
-    pub(super) fn single_leaf(&self, scene: &impl Scene) -> bool {
+    pub(in crate::tlas) fn single_leaf(&self, scene: &impl LeafOracle) -> bool {
         self.leaves.len() == 1 && scene.is_visible(0)
     }
 }

@@ -1,10 +1,10 @@
 //! Adaptive tree splitting (Conty Estevez and Kulla 2018, section 5.4): where the lights of a node differ much, as
 //! seen from the shading point, all of its children are visited instead of one.
 
-use super::importance::Scene;
-use super::node::{Child, TlasView};
+use super::importance::LeafOracle;
 use crate::math;
 use crate::record::ShadingPoint;
+use crate::tlas::node::{Child, TlasView};
 use crate::warp::{self, Variate};
 
 /// How far a light tree is split.
@@ -36,7 +36,7 @@ impl<const N: usize> TlasView<'_, N> {
     pub(crate) fn sample_split(
         &self,
         x: &ShadingPoint,
-        scene: &impl Scene,
+        scene: &impl LeafOracle,
         splitting: &Splitting,
         mut variate: impl FnMut(u32) -> Variate,
         mut visit: impl FnMut(u32, f64),
@@ -84,7 +84,13 @@ impl<const N: usize> TlasView<'_, N> {
     }
 
     /// Expected number of times that [`Self::sample_split`] visits a leaf.
-    pub(crate) fn expected_count(&self, leaf: u32, x: &ShadingPoint, scene: &impl Scene, splitting: &Splitting) -> f64 {
+    pub(crate) fn expected_count(
+        &self,
+        leaf: u32,
+        x: &ShadingPoint,
+        scene: &impl LeafOracle,
+        splitting: &Splitting,
+    ) -> f64 {
         if self.nodes.is_empty() {
             return self.pmf(leaf, x, scene, None);
         }

@@ -7,7 +7,7 @@
 
 use alloc::vec::Vec;
 
-use super::build::BinaryNode;
+use super::binary::BinaryNode;
 use crate::math;
 
 /// What every wide node costs, relative to the mean over all small clusters.
@@ -68,12 +68,12 @@ impl<const N: usize> Forest<N> {
 }
 
 /// The binary nodes that the lanes of a wide node stand for, in the tree's order.
-pub(super) struct Cut<const N: usize> {
+pub(super) struct LaneCut<const N: usize> {
     lanes: [usize; N],
     width: usize,
 }
 
-impl<const N: usize> Cut<N> {
+impl<const N: usize> LaneCut<N> {
     /// Of the wide node made of a binary one.
     pub(super) fn new(binary: &[BinaryNode], forests: &[Forest<N>], root: usize) -> Self {
         let mut cut = Self { lanes: [0; N], width: 0 };

@@ -17,19 +17,19 @@ pub(crate) struct Cancelled;
 const PLACED: f32 = 0.9;
 
 /// Counts the lights that have found their place, if a host wants to know.
-pub(super) struct Progress<'a> {
+pub(in crate::tlas) struct Progress<'a> {
     report: Option<Report<'a>>,
     total: usize,
     placed: Counter,
 }
 
 impl<'a> Progress<'a> {
-    pub(super) fn new(report: Option<Report<'a>>, total: usize) -> Self {
+    pub(in crate::tlas) fn new(report: Option<Report<'a>>, total: usize) -> Self {
         Self { report, total, placed: Counter::default() }
     }
 
     /// Counts more lights that have found their place.
-    pub(super) fn add(&self, count: usize) {
+    pub(in crate::tlas) fn add(&self, count: usize) {
         let Some(report) = self.report else { return };
         let placed = self.placed.add(count);
         if placed < CANCELLED && report(PLACED * placed as f32 / self.total as f32).is_break() {
@@ -37,7 +37,7 @@ impl<'a> Progress<'a> {
         }
     }
 
-    pub(super) fn check(&self) -> Result<(), Cancelled> {
+    pub(in crate::tlas) fn check(&self) -> Result<(), Cancelled> {
         if self.placed.get() < CANCELLED { Ok(()) } else { Err(Cancelled) }
     }
 }

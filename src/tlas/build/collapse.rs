@@ -2,9 +2,9 @@
 
 use alloc::vec::Vec;
 
-use super::build::BinaryNode;
-use super::forest::{Cut, forests};
-use super::node::{Node, Slot, Spread, Tlas};
+use super::binary::BinaryNode;
+use super::forest::{LaneCut, forests};
+use crate::tlas::node::{Node, Slot, Spread, Tlas};
 
 /// Collapses a binary tree. Returns the wide tree, whose nodes have no bounds yet, with the lights in the order of its
 /// leaves, which follows the tree, so that the lights of one node are neighbours in memory. So are the nodes below one
@@ -22,7 +22,7 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
     // Wide nodes that wait for their children, each with its binary node.
     let mut pending = Vec::from([(0, 0)]);
     while let Some((index, root)) = pending.pop() {
-        let cut = Cut::new(binary, &forests, root);
+        let cut = LaneCut::new(binary, &forests, root);
         let members = || cut.members().iter().copied();
         let nodes = members().filter(|&below| binary[below].count > 1);
         let leaves = members().filter(|&below| binary[below].count == 1);

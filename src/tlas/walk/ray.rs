@@ -3,9 +3,9 @@
 
 use glam::Vec3;
 
-use super::node::{Child, Node, TlasView};
 use crate::math::{self, at_least, at_most};
-use crate::simd::{Level, Work};
+use crate::simd::{InstructionSet, Kernel};
+use crate::tlas::node::{Child, Node, TlasView};
 
 /// Relative widening of the interval that a ray spends in a box: covers the rounding of its two ends.
 const WIDENING: f32 = 1e-5;
@@ -17,14 +17,14 @@ impl<const N: usize> TlasView<'_, N> {
     /// Calls `visit` for each leaf whose box the ray from `origin` along `direction` (need not be a unit vector)
     /// crosses.
     pub(crate) fn cross(&self, origin: Vec3, direction: Vec3, visit: impl FnMut(u32)) {
-        let (level, inverse) = (Level::best(), direction.recip());
+        let (level, inverse) = (InstructionSet::best(), direction.recip());
         self.walk(|node| level.run(Crossed { node, origin, inverse }), visit);
     }
 
     /// Calls `visit` for each leaf whose box may hold a point in a cone around a unit vector, with an angular radius of
     /// this sine and cosine.
     pub(crate) fn meet(&self, origin: Vec3, axis: Vec3, cone: [f32; 2], visit: impl FnMut(u32)) {
-        let level = Level::best();
+        let level = InstructionSet::best();
         self.walk(|node| level.run(Met { node, origin, axis, cone }), visit);
     }
 
@@ -66,13 +66,13 @@ impl<const N: usize> TlasView<'_, N> {
 }
 
 /// Lanes whose boxes a ray crosses.
-pub(super) struct Crossed<'a, const N: usize> {
-    pub(super) node: &'a Node<N>,
-    pub(super) origin: Vec3,
-    pub(super) inverse: Vec3,
+pub(in crate::tlas) struct Crossed<'a, const N: usize> {
+    pub(in crate::tlas) node: &'a Node<N>,
+    pub(in crate::tlas) origin: Vec3,
+    pub(in crate::tlas) inverse: Vec3,
 }
 
-impl<const N: usize> Work for Crossed<'_, N> {
+impl<const N: usize> Kernel for Crossed<'_, N> {
     type Output = u32;
 
     /// Slab test. A ray in the plane of a slab gives NaN there, which the comparisons pass over.
@@ -97,14 +97,14 @@ impl<const N: usize> Work for Crossed<'_, N> {
 }
 
 /// Lanes whose boxes, or the balls around them, reach a cone.
-pub(super) struct Met<'a, const N: usize> {
-    pub(super) node: &'a Node<N>,
-    pub(super) origin: Vec3,
-    pub(super) axis: Vec3,
-    pub(super) cone: [f32; 2],
+pub(in crate::tlas) struct Met<'a, const N: usize> {
+    pub(in crate::tlas) node: &'a Node<N>,
+    pub(in crate::tlas) origin: Vec3,
+    pub(in crate::tlas) axis: Vec3,
+    pub(in crate::tlas) cone: [f32; 2],
 }
 
-impl<const N: usize> Work for Met<'_, N> {
+impl<const N: usize> Kernel for Met<'_, N> {
     type Output = u32;
 
     /// By the distance of a ball's centre from the cone's surface, negative inside, against its radius.

@@ -7,13 +7,13 @@
 
 use glam::Vec3;
 
-use super::node::{ALL, Child, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
 use crate::math::{self, at_least, only_if};
 use crate::record::{Receiver, ShadingPoint};
+use crate::tlas::node::{ALL, Child, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
 use crate::warp::{keep_least, within_range};
 
 /// What the tree asks of the level above.
-pub(crate) trait Scene {
+pub(crate) trait LeafOracle {
     /// Mean radiances, relative to the mean over all directions, of what portals show in the directions from the
     /// shading point to balls with these centres (by axis, relative to the shading point) and radii. Zero only where
     /// all of it is black. Only those in a set of bits are asked for.
@@ -24,7 +24,7 @@ pub(crate) trait Scene {
     fn is_visible(&self, leaf: u32) -> bool;
 }
 
-impl<S: Scene> Scene for &S {
+impl<S: LeafOracle> LeafOracle for &S {
     #[inline(always)]
     fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N] {
         (**self).radiances(centers, radii, set)
@@ -58,7 +58,7 @@ const RECEIVER_SHARE: f32 = 0.8;
 const DISTANCE_SHARE: f32 = 0.3;
 
 /// A shading point, as the loop over lanes wants it.
-pub(super) struct Sight {
+pub(super) struct ReceiverLanes {
     position: Vec3,
     /// What the cosine at the receiver is taken with; zero in a medium.
     normal: Vec3,
@@ -73,7 +73,7 @@ pub(super) struct Sight {
     slack: f32,
 }
 
-impl Sight {
+impl ReceiverLanes {
     #[inline(always)]
     pub(super) fn new(x: &ShadingPoint) -> Self {
         let position = x.position;
@@ -101,7 +101,7 @@ struct Estimates<const N: usize> {
 impl<const N: usize> Node<N> {
     /// Weight of every child. All zero where nothing below the node can be visible.
     #[inline(always)]
-    pub(super) fn weights(&self, x: &Sight, scene: &impl Scene) -> [f32; N] {
+    pub(super) fn weights(&self, x: &ReceiverLanes, scene: &impl LeafOracle) -> [f32; N] {
         let Estimates { mut weights, mut largest, doubtful } = self.estimates(x);
         if doubtful != 0 {
             largest = self.ask(scene, &mut weights, doubtful);
@@ -115,7 +115,7 @@ impl<const N: usize> Node<N> {
 
     /// Asks the level above about leaves in doubt, and returns the bits of the largest weight.
     #[inline(never)]
-    fn ask(&self, scene: &impl Scene, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
+    fn ask(&self, scene: &impl LeafOracle, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
         while doubtful != 0 {
             let lane = doubtful.trailing_zeros() as usize;
             doubtful &= doubtful - 1;
@@ -129,7 +129,7 @@ impl<const N: usize> Node<N> {
 
     /// Multiplies what comes through portals by what is seen there, and returns the bits of the largest weight.
     #[inline(always)]
-    fn look_through(&self, x: &Sight, scene: &impl Scene, weights: &mut [f32; N]) -> u32 {
+    fn look_through(&self, x: &ReceiverLanes, scene: &impl LeafOracle, weights: &mut [f32; N]) -> u32 {
         let (portals, centers, halves) = (self.portals, self.centers, self.halves);
         let origin = Vec3::from_array(self.origin) - x.position;
         let step = Vec3::from_array(self.steps.map(wide));
@@ -156,7 +156,7 @@ impl<const N: usize> Node<N> {
 
     /// The geometry of all lanes, in one plain loop over arrays that a compiler can turn into vectors.
     #[inline(always)]
-    fn estimates(&self, x: &Sight) -> Estimates<N> {
+    fn estimates(&self, x: &ReceiverLanes) -> Estimates<N> {
         let (normals, energies, centers, halves) = (self.normals, self.energies, self.centers, self.halves);
         let (means, deviations, lengths, tangents) = (self.means, self.deviations, self.lengths, self.tangents);
         // Relative to the shading point before anything else: far from the origin the difference is what is exact.

@@ -1,0 +1,44 @@
+//! How the tree is made: first a binary tree that arranges the lights ([`binary`]), then the wide tree whose nodes are
+//! cuts through it ([`collapse`]), and last what its nodes say of their children ([`fit`]).
+
+mod binary;
+mod bins;
+mod cluster;
+mod collapse;
+mod encode;
+mod fit;
+mod forest;
+mod progress;
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use binary::{BinaryNode, subdivide};
+use cluster::Item;
+use collapse::collapse;
+use progress::{Cancelled, Progress};
+
+pub(crate) use progress::Report;
+
+use crate::bounds::LightBounds;
+use crate::parallel;
+use crate::tlas::node::Tlas;
+
+/// Arranges `count` lights, of which `light` tells the bounds, in a tree of arity `N`. Returns it with the lights in the
+/// order of its leaves; its nodes know no bounds until [`Tlas::fit`].
+pub(crate) fn build<const N: usize>(
+    count: usize,
+    light: &(impl Fn(u32) -> LightBounds + Sync),
+    report: Option<Report<'_>>,
+) -> Result<(Tlas<N>, Vec<u32>), Cancelled> {
+    if count == 0 {
+        return Ok((Tlas::default(), Vec::new()));
+    }
+    let progress = Progress::new(report, count);
+    let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
+    let mut binary = vec![BinaryNode::default(); 2 * count - 1];
+    subdivide(&mut items, &mut binary, 0, &progress);
+    progress.check()?;
+    drop(items);
+    Ok(collapse(&binary))
+}
