@@ -148,7 +148,7 @@ pub use sampler::{
     Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshUpdate, PointSampler,
     Sides, TextureId, Weight,
 };
-pub use tlas::Splitting;
+pub use tlas::{Arity, Splitting};
 /// For the benches: no part of the interface.
 #[doc(hidden)]
 pub use warp::equal_area::{sphere_to_square, square_to_sphere};

@@ -78,7 +78,7 @@ fn check(name: &str, make: impl Fn(&mut Pcg32, usize) -> Scene + Sync) {
     let results = parallel::map(SCENES, |number| {
         let mut pcg = Pcg32::new(3000 + number as u64, 31);
         let scene = make(&mut pcg, number);
-        let lights: LightSampler = scene.build();
+        let lights: LightSampler = scene.build::<16, 4>();
         let emission = lights.emission();
         assert_agreement(&emission, &mut pcg);
         let mean = photon_power(&scene, &emission, &mut pcg);
@@ -137,7 +137,7 @@ fn rays_through_two_portals_count_once() {
     let mut scene = Scene::new("nested", vec![outer, inner]);
     let mut pcg = Pcg32::new(9, 9);
     scene.sky = Sky::random(&mut pcg, 1);
-    let lights: LightSampler = scene.build();
+    let lights: LightSampler = scene.build::<16, 4>();
     let emission = lights.emission();
     // The floor through both, and what the inner one alone would say.
     let through_both = |ray: &EmissionSample| {
@@ -172,7 +172,7 @@ fn a_distant_light_passes_portals_by_their_area() {
         let mut scene = Scene::new("soup", vec![LightMesh::soup(&mut pcg, 12, 0.3).paint(Paint::Image(0)).portal()]);
         scene.images.push(Image { filter: Filter::Nearest, ..Image::random(&mut pcg, 1) });
         scene.sky = Sky::random(&mut pcg, usize::from(number % 2 == 0));
-        let lights: LightSampler = scene.build();
+        let lights: LightSampler = scene.build::<16, 4>();
         let emission = lights.emission();
         let direction = pcg.direction();
         let (mut through, mut exact) = (Mean::default(), 0.0);
@@ -208,15 +208,15 @@ fn nothing_comes_out_of_nothing() {
     let opening = LightMesh::quad(Vec3::ZERO, Vec3::X, Vec3::Y).portal();
     let mut scene = Scene::new("dark", vec![opening]);
     scene.sky = Sky::Constant(0.0);
-    let lights: LightSampler = scene.build();
+    let lights: LightSampler = scene.build::<16, 4>();
     assert_eq!(lights.emission().sample([0.5; 5]), None);
-    let empty: LightSampler = Scene::new("empty", Vec::new()).build();
+    let empty: LightSampler = Scene::new("empty", Vec::new()).build::<16, 4>();
     assert_eq!(empty.emission().sample([0.5; 5]), None);
     assert_eq!(empty.emission().sample_distant(Vec3::X, [0.5; 3]), None);
     assert_eq!(empty.emission().pdf_ray(Vec3::ZERO, Vec3::X), 0.0);
     // A portal that faces up, under a sky that is lit near the zenith alone: no light goes up through it.
     scene.sky = Sky::LatLong { size: [16, 8], texels: (0..128).map(|i| f32::from(u8::from(i < 32))).collect() };
-    let lights: LightSampler = scene.build();
+    let lights: LightSampler = scene.build::<16, 4>();
     let mut pcg = Pcg32::new(1, 1);
     let emission = lights.emission();
     for _ in 0..1000 {

@@ -218,7 +218,7 @@ fn the_density_of_one_triangle_moves_with_it() {
     assert!(equal as f64 > 0.99 * ratios.len() as f64, "{equal} of {}", ratios.len());
 }
 
-fn estimate(scene: &Scene, lights: &LightSampler<16, 4>, x: &ShadingPoint, pcg: &mut Pcg32) -> Mean {
+fn estimate(scene: &Scene, lights: &LightSampler<4>, x: &ShadingPoint, pcg: &mut Pcg32) -> Mean {
     let mut mean = Mean::default();
     for _ in 0..20_000 {
         let sample = lights.sample(x, pcg.cube());
@@ -234,10 +234,10 @@ fn estimates_are_the_same() {
         let (scene, mut pcg) = scene(number, [1, 4, 30, 300][number % 4]);
         let mut failed = Vec::new();
         let x = random_point(&mut pcg, number);
-        let first = estimate(&scene, &scene.build(), &x, &mut pcg);
+        let first = estimate(&scene, &scene.build::<16, 4>(), &x, &mut pcg);
         for (name, change) in CHANGES {
             let changed = change(&scene, &x, &mut pcg);
-            let other = estimate(&changed.scene, &changed.scene.build(), &changed.x, &mut pcg);
+            let other = estimate(&changed.scene, &changed.scene.build::<16, 4>(), &changed.x, &mut pcg);
             let limit = 4.5 * first.error().hypot(other.error()) + 1e-4 * first.mean();
             if !((first.mean() - other.mean()).abs() <= limit) {
                 failed.push(format!("{} {name} from {x:?}: {} and {}", scene.name, first.mean(), other.mean()));

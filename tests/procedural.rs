@@ -68,8 +68,9 @@ fn light() -> Scene {
     }
 }
 
-fn sampler<const N: usize, const M: usize>(scene: &Scene, function: &dyn Procedural) -> LightSampler<N, M> {
+fn sampler<const N: usize, const M: usize>(scene: &Scene, function: &dyn Procedural) -> LightSampler<M> {
     let mut builder = LightSamplerBuilder::new();
+    builder.arity(common::scene::arity(N));
     let weight = Weight::Texture(builder.add_procedural(function));
     let LightMesh { positions, indices, uvs, .. } = &scene.meshes[0];
     builder.add_mesh(&Mesh::emitter(positions, indices).uvs(uvs).weight(weight)).expect("the mesh is valid");
@@ -245,7 +246,7 @@ fn cells(count: u32, scale: f32, function: &dyn Procedural) -> usize {
     let mut bytes = lights.to_bytes();
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     let words = common::lights::aligned(&bytes);
-    LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+    LightSamplerView::<4>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
     lights.as_view().bytes()[2]
 }
 

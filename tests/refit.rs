@@ -43,7 +43,7 @@ fn changed(scene: &Scene, pcg: &mut Pcg32) -> (Scene, Vec<f32>) {
     (scene, scales)
 }
 
-fn refit<const N: usize, const M: usize>(lights: &mut LightSampler<N, M>, scene: &Scene, scales: &[f32]) {
+fn refit<const M: usize>(lights: &mut LightSampler<M>, scene: &Scene, scales: &[f32]) {
     let mut updates = Vec::new();
     for (number, mesh) in (0..).zip(&scene.meshes) {
         let update = MeshUpdate::new(number).moved(&mesh.positions, &mesh.indices);
@@ -52,7 +52,7 @@ fn refit<const N: usize, const M: usize>(lights: &mut LightSampler<N, M>, scene:
     lights.refit(&updates).expect("the changes are valid");
 }
 
-fn samples<const N: usize>(lights: &LightSampler<N>, count: usize) -> Vec<Option<LightSample>> {
+fn samples(lights: &LightSampler, count: usize) -> Vec<Option<LightSample>> {
     let mut pcg = Pcg32::new(1, 32);
     (0..count).map(|i| lights.sample(&random_point(&mut pcg, i), pcg.cube())).collect()
 }
@@ -382,7 +382,7 @@ fn bytes_hold_what_has_changed() {
     let (other, scales) = changed(&scene, &mut pcg);
     refit(&mut lights, &other, &scales);
     let words = common::lights::aligned(&lights.to_bytes());
-    let view = fanlight::LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes load");
+    let view = fanlight::LightSamplerView::<4>::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes load");
     for i in 0..2000 {
         let (x, u) = (random_point(&mut pcg, i), pcg.cube());
         assert_eq!(view.sample(&x, u), lights.sample(&x, u));

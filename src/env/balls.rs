@@ -7,6 +7,9 @@ use super::view::{EnvironmentView, texel_at};
 use crate::warp::equal_area::sphere_to_square;
 use glam::Vec3;
 
+/// Largest number of balls: *format*, the largest arity of a tree over triangles.
+const MAX_BALLS: usize = 16;
+
 /// Fewer balls than this are looked at one by one: vectors for all lanes would mostly be empty.
 const FEW: u32 = 4;
 
@@ -15,33 +18,31 @@ impl EnvironmentView<'_> {
     /// centres by axis, relative to the viewer. Zero only if a ball is black. Only the balls in a set of bits are
     /// looked at.
     #[inline(always)]
-    pub(crate) fn averages_of_balls<const N: usize>(
-        &self,
-        centers: &[[f32; N]; 3],
-        radii: &[f32; N],
-        set: u32,
-    ) -> [f32; N] {
+    pub(crate) fn averages_of_balls(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, values: &mut [f32]) {
         if self.is_constant() {
-            return [self.header.mean; N];
+            values.fill(self.header.mean);
+            return;
         }
-        let mut values = [0.0; N];
-        let asked = (0..N).filter(|i| set >> i & 1 == 1);
+        let count = radii.len().min(MAX_BALLS);
+        let center = |i: usize| centers.map(|centers| centers[i]);
+        let asked = (0..count).filter(|i| set >> i & 1 == 1);
         if self.has_black() {
             for i in asked {
-                values[i] = self.average_of_ball([0, 1, 2].map(|axis| centers[axis][i]), radii[i]);
+                values[i] = self.average_of_ball(center(i), radii[i]);
             }
         } else if set.count_ones() < FEW {
             for i in asked {
-                let texels = self.texels_of_balls(&[0, 1, 2].map(|axis| [centers[axis][i]]), &[radii[i]]);
-                values[i] = self.estimate(texels[0]);
+                values[i] = self.estimate(self.texel_of_ball(center(i), radii[i]));
             }
         } else {
-            let texels = self.texels_of_balls(centers, radii);
+            let mut texels = [0; MAX_BALLS];
+            for i in 0..count {
+                texels[i] = self.texel_of_ball(center(i), radii[i]);
+            }
             for i in asked {
                 values[i] = self.estimate(texels[i]);
             }
         }
-        values
     }
 
     /// Whether any texel is black.
@@ -62,17 +63,13 @@ impl EnvironmentView<'_> {
         self.average(&Footprint::ball(Vec3::new(x, y, z), radius)).value
     }
 
-    /// The texels that stand for balls, in one plain loop over arrays that a compiler can turn into vectors.
+    /// The texel that stands for a ball, without a branch, so that loops over balls can become vectors.
     #[inline(always)]
-    fn texels_of_balls<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N]) -> [u32; N] {
-        let mut texels = [0; N];
-        for i in 0..N {
-            let ball = Footprint::ball(Vec3::new(centers[0][i], centers[1][i], centers[2][i]), radii[i]);
-            let place = sphere_to_square(to_local(&self.header.rotation, ball.direction));
-            let depth = self.depth_of_solid_angle(ball.solid_angle);
-            texels[i] = level_start(depth) as u32 + texel_at(depth, place);
-        }
-        texels
+    fn texel_of_ball(&self, [x, y, z]: [f32; 3], radius: f32) -> u32 {
+        let ball = Footprint::ball(Vec3::new(x, y, z), radius);
+        let place = sphere_to_square(to_local(&self.header.rotation, ball.direction));
+        let depth = self.depth_of_solid_angle(ball.solid_angle);
+        level_start(depth) as u32 + texel_at(depth, place)
     }
 }
 

@@ -13,7 +13,7 @@ use crate::env::Environment;
 use crate::error::{Error, Kind as ErrorKind};
 use crate::light::{Illumination, LightTriangle};
 use crate::parallel;
-use crate::tlas::{self, MAX_LEAVES, Report};
+use crate::tlas::{self, Arity, MAX_LEAVES, Report};
 
 /// What a textured weight is read from.
 #[derive(Debug)]
@@ -24,13 +24,13 @@ enum Surface<'a> {
 
 /// Collects the lights of a scene and builds a [`LightSampler`].
 ///
-/// Everything is checked when it is added; what was accepted can always be sampled. `N` is the arity of the tree
-/// over triangles (4, 8 or 16), `M` that of the trees over textures (4, 16 or 64).
-/// The wider a tree, the better its choices; on machines without AVX, 8 may be faster than the default of 16.
+/// Everything is checked when it is added; what was accepted can always be sampled. `M` is the arity of the
+/// trees over textures (4, 16 or 64).
 #[derive(Debug)]
-pub struct LightSamplerBuilder<'a, const N: usize = 16, const M: usize = 4> {
+pub struct LightSamplerBuilder<'a, const M: usize = 4> {
     environment: Option<Environment>,
     illumination: Illumination,
+    arity: Arity,
     textures: Vec<Surface<'a>>,
     /// Triangles that may send light.
     triangles: Vec<LightTriangle>,
@@ -43,19 +43,19 @@ pub struct LightSamplerBuilder<'a, const N: usize = 16, const M: usize = 4> {
     shared: BTreeMap<(usize, [u32; 6]), Root>,
 }
 
-impl<const N: usize, const M: usize> Default for LightSamplerBuilder<'_, N, M> {
+impl<const M: usize> Default for LightSamplerBuilder<'_, M> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
+impl<'a, const M: usize> LightSamplerBuilder<'a, M> {
     /// A builder without lights, whose environment is white.
     pub fn new() -> Self {
-        const { assert!(N == 4 || N == 8 || N == 16, "the arity of the tree over triangles is 4, 8 or 16") };
         Self {
             environment: None,
             illumination: Illumination::default(),
+            arity: Arity::default(),
             textures: Vec::new(),
             triangles: Vec::new(),
             places: Vec::new(),
@@ -74,6 +74,12 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// Sets the term that guides the descent inside a triangle.
     pub fn illumination(&mut self, illumination: Illumination) -> &mut Self {
         self.illumination = illumination;
+        self
+    }
+
+    /// Sets the arity of the tree over triangles.
+    pub fn arity(&mut self, arity: Arity) -> &mut Self {
+        self.arity = arity;
         self
     }
 
@@ -124,7 +130,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// # Errors
     ///
     /// If there are more triangles than the tree can number (2^28 - 1).
-    pub fn build(self) -> Result<LightSampler<N, M>, Error> {
+    pub fn build(self) -> Result<LightSampler<M>, Error> {
         self.build_reporting(None)
     }
 
@@ -136,11 +142,11 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// # Errors
     ///
     /// As [`Self::build`], and one of which [`Error::is_cancelled`] is true if `report` has cancelled the build.
-    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler<N, M>, Error> {
+    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler<M>, Error> {
         self.build_reporting(Some(&report))
     }
 
-    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N, M>, Error> {
+    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<M>, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
         let energies = Energies::new(&environment, Scales::default());
         let sends = parallel::collect(self.triangles.len(), |i| energies.energy(&self.triangles[i]) > 0.0);
@@ -151,7 +157,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
         let total = energies.total(&self.triangles);
         let bounds = |light: u32| energies.bounds(&self.triangles[sending[light as usize] as usize], total).0;
         let cancelled = |_| Error(ErrorKind::Cancelled);
-        let (tlas, order) = tlas::build::<N>(sending.len(), &bounds, report).map_err(cancelled)?;
+        let (tlas, order) = tlas::build(self.arity, sending.len(), &bounds, report).map_err(cancelled)?;
         let places = parallel::collect(order.len(), |leaf| sending[order[leaf] as usize]);
         let triangles = parallel::collect(places.len(), |leaf| self.triangles[places[leaf] as usize]);
         let portals = self.triangles.iter().any(LightTriangle::is_portal);

@@ -12,7 +12,7 @@ use crate::blas;
 use crate::env::{EnvironmentHeader, EnvironmentParts, EnvironmentView};
 use crate::error::Error;
 use crate::light::Illumination;
-use crate::tlas::TlasView;
+use crate::tlas::{Arity, TlasView};
 
 const MAGIC: [u8; 8] = *b"fanlight";
 /// Changes with every change of a layout.
@@ -38,14 +38,14 @@ struct Header {
     lengths: [u64; BUFFERS],
 }
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const M: usize> LightSampler<M> {
     /// See [`LightSamplerView::to_bytes`].
     pub fn to_bytes(&self) -> Vec<u8> {
         self.as_view().to_bytes()
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+impl<'a, const M: usize> LightSamplerView<'a, M> {
     /// Everything as bytes, to be written to disk, mapped, shared or uploaded, and to be read by
     /// [`Self::from_bytes`] on a machine of the same byte order.
     pub fn to_bytes(&self) -> Vec<u8> {
@@ -54,7 +54,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             magic: MAGIC,
             version: VERSION,
             byte_order: BYTE_ORDER,
-            arities: [N as u32, M as u32],
+            arities: [self.tlas.arity.code(), M as u32],
             illumination: self.illumination as u32,
             energy: self.energy,
             portals: self.portals.into(),
@@ -93,12 +93,12 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     ///
     /// # Errors
     ///
-    /// If the bytes are not aligned, cut off, of another version, byte order or arity, or hold anything that sampling
+    /// If the bytes are not aligned, cut off, of another version, byte order or arity of textures, or hold anything that sampling
     /// could stumble over. Bytes from an untrusted source are safe to load.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut reader = Reader { bytes, at: 0 };
         let header: Header = reader.value("header")?;
-        header.check(N, M)?;
+        let arity = header.check(M)?;
         let environment_header: EnvironmentHeader = reader.value("header of the environment")?;
         let [
             nodes,
@@ -120,6 +120,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             illumination: Illumination::from_u32(header.illumination)
                 .ok_or_else(|| Error::bytes("illumination", 0, header.illumination, 0u64))?,
             tlas: TlasView {
+                arity,
                 nodes: reader.slice("nodes", nodes)?,
                 parents: reader.slice("parents", parents)?,
                 spreads: reader.slice("spreads", spreads)?,
@@ -188,7 +189,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
 }
 
 impl Header {
-    fn check(&self, n: usize, m: usize) -> Result<(), Error> {
+    fn check(&self, m: usize) -> Result<Arity, Error> {
         let expect = |what, found: u64, expected: u64| {
             if found == expected { Ok(()) } else { Err(Error::bytes(what, 0, found, expected)) }
         };
@@ -199,8 +200,10 @@ impl Header {
             return Err(Error::bytes("energy", 0, self.energy.to_bits(), 0u64));
         }
         expect("mark of portals", (self.portals & !1).into(), 0)?;
-        expect("arity of the tree over triangles", self.arities[0].into(), n as u64)?;
-        expect("arity of the trees over textures", self.arities[1].into(), m as u64)
+        expect("arity of the trees over textures", self.arities[1].into(), m as u64)?;
+        let [code, _] = self.arities;
+        Arity::from_code(code)
+            .ok_or_else(|| Error::bytes("arity of the tree over triangles", 0, code, Arity::default().code()))
     }
 }
 

@@ -17,15 +17,13 @@ pub(super) const NO_LEAF: u32 = u32::MAX;
 /// Marks a triangle that is not in the tree because it has no area.
 pub(super) const NO_AREA: u32 = u32::MAX - 1;
 
-/// All lights of a scene, ready to be sampled. `N` is the arity of the tree over triangles (4, 8 or 16), `M` that of
-/// the trees over textures (4, 16 or 64).
-/// The wider a tree, the better its choices; on machines without AVX, 8 may be faster than the default of 16.
+/// All lights of a scene, ready to be sampled. `M` is the arity of the trees over textures (4, 16 or 64).
 ///
 /// All that a shading point needs works on [`LightSamplerView`], which borrows plain data; the methods here forward
 /// to it.
 #[derive(Clone, Debug)]
-pub struct LightSampler<const N: usize = 16, const M: usize = 4> {
-    pub(super) tlas: Tlas<N>,
+pub struct LightSampler<const M: usize = 4> {
+    pub(super) tlas: Tlas,
     /// In the order of the tree's leaves.
     pub(super) triangles: Vec<LightTriangle>,
     pub(super) cells: Vec<blas::Block<M>>,
@@ -49,8 +47,8 @@ pub struct LightSampler<const N: usize = 16, const M: usize = 4> {
 
 /// All lights of a scene in borrowed memory: plain data that can be mapped from a file or shared between processes.
 #[derive(Clone, Copy, Debug)]
-pub struct LightSamplerView<'a, const N: usize = 16, const M: usize = 4> {
-    pub(super) tlas: TlasView<'a, N>,
+pub struct LightSamplerView<'a, const M: usize = 4> {
+    pub(super) tlas: TlasView<'a>,
     pub(super) triangles: &'a [LightTriangle],
     pub(super) cells: &'a [blas::Block<M>],
     pub(super) meshes: &'a [u32],
@@ -69,10 +67,10 @@ impl LightSampler {
     }
 }
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const M: usize> LightSampler<M> {
     /// The same lights in borrowed form.
     #[inline]
-    pub fn as_view(&self) -> LightSamplerView<'_, N, M> {
+    pub fn as_view(&self) -> LightSamplerView<'_, M> {
         LightSamplerView {
             tlas: self.tlas.view(),
             triangles: &self.triangles,
@@ -102,7 +100,7 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+impl<'a, const M: usize> LightSamplerView<'a, M> {
     /// The environment, for its own sampling.
     pub fn environment(&self) -> EnvironmentView<'a> {
         self.environment
@@ -192,14 +190,15 @@ pub(super) struct Scene<'a> {
 
 impl tlas::LeafOracle for Scene<'_> {
     #[inline(always)]
-    fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N] {
+    fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
         let mean = self.environment.mean_without_suns();
         if mean <= 0.0 {
-            return [0.0; N];
+            return;
         }
         // What is not black stays so, however bright the rest is.
         let relative = |value: f32| only_if(value > 0.0, at_least(value / mean, f32::MIN_POSITIVE));
-        self.environment.averages_of_balls(centers, radii, set).map(relative)
+        self.environment.averages_of_balls(centers, radii, set, radiances);
+        radiances.iter_mut().for_each(|radiance| *radiance = relative(*radiance));
     }
 
     #[inline]

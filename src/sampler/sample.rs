@@ -8,7 +8,7 @@ use crate::record::{Hit, LightSample};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
 
-impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+impl<const M: usize> PointSampler<'_, M> {
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first chooses the triangle, the other two the
     /// point on it, so that stratified pairs stay stratified.
     ///

@@ -17,9 +17,10 @@ use crate::geometry;
 use crate::light::{Lit, Sunlit};
 use crate::math;
 use crate::record::{Receiver, ShadingPoint};
+use crate::tlas::FirstWeights;
 use crate::warp::Variate;
 
-impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
+impl<const M: usize> LightSamplerView<'_, M> {
     /// Whether suns may be seen through portals.
     #[inline]
     pub(super) fn has_suns(&self) -> bool {
@@ -27,7 +28,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     }
 
     /// What each technique is worth at a shading point, and the weights of the tree's first choice if that took them.
-    pub(super) fn weigh(&self, x: &ShadingPoint) -> (Techniques, Option<[f32; N]>) {
+    pub(super) fn weigh(&self, x: &ShadingPoint) -> (Techniques, Option<FirstWeights>) {
         let mut pairs = Pairs::NONE;
         for sun in 0..self.environment.suns().len() {
             self.find(sun, x, &mut pairs);
@@ -35,7 +36,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
         let mut weights = None;
         let techniques = Techniques::balance(pairs, || {
             weights = self.tlas.first_weights(x, &self.scene(x));
-            weights.map_or_else(|| self.irradiance_from_one(x), |weights| self.energy * weights.iter().sum::<f32>())
+            weights.map_or_else(|| self.irradiance_from_one(x), |weights| self.energy * weights.sum())
         });
         (techniques, weights)
     }
@@ -110,7 +111,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     }
 }
 
-impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+impl<const M: usize> PointSampler<'_, M> {
     /// Draws a point on a portal towards a sun, by its place in the list.
     pub(super) fn sun_point(&self, index: usize, u: [Variate; 2]) -> Option<(u32, Lattice)> {
         let Seen { leaf, sun, part } = self.techniques.suns()?.seen(index);

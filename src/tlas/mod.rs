@@ -3,14 +3,17 @@
 //! It sees bounds and opaque leaf numbers only; what a leaf is, and what light arrives from behind a portal, it
 //! asks of the level above through [`LeafOracle`].
 
+mod arity;
 mod build;
 mod node;
 #[cfg(test)]
 mod tests;
+mod tree;
 mod validate;
 mod walk;
 
+pub use arity::Arity;
 pub(crate) use build::{Report, build};
-pub(crate) use node::{MAX_LEAVES, Tlas, TlasView};
+pub(crate) use tree::{MAX_LEAVES, Tlas, TlasView};
 pub use walk::Splitting;
-pub(crate) use walk::{Beam, Descent, LeafOracle, Outgoing, TURNS};
+pub(crate) use walk::{Beam, Descent, FirstWeights, LeafOracle, Outgoing, TURNS};

@@ -1,12 +1,7 @@
-//! Nodes of the light tree and the buffers they live in.
-
-use alloc::vec::Vec;
+//! Nodes of the light tree, and what is kept next to them.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-
-/// Most leaves that a tree can number.
-pub(crate) const MAX_LEAVES: usize = (1 << 28) - 1;
 
 /// Bit of [`Node::normals`] that marks a two-sided light.
 pub(super) const TWO_SIDED: u32 = 1 << 31;
@@ -61,6 +56,15 @@ pub(crate) struct Node<const N: usize> {
     /// Shares of the energies to be multiplied by what is seen through a portal. 0 and [`ALL`] are exact.
     pub(super) portals: [u8; N],
 }
+
+/// Number of words of a node. Nodes have no padding, so that they can be kept as an array of words for any arity.
+pub(super) const fn words<const N: usize>() -> usize {
+    size_of::<Node<N>>() / size_of::<u32>()
+}
+
+const _: () = assert!(size_of::<Node<4>>() == 4 * words::<4>() && words::<4>() == 26);
+const _: () = assert!(size_of::<Node<8>>() == 4 * words::<8>() && words::<8>() == 45);
+const _: () = assert!(size_of::<Node<16>>() == 4 * words::<16>() && words::<16>() == 83);
 
 /// What a lane of a node refers to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -209,34 +213,4 @@ impl Slot {
     pub(super) fn get<const N: usize>(self) -> Option<(usize, usize)> {
         (self != Self::ROOT).then_some((self.0 as usize / N, self.0 as usize % N))
     }
-}
-
-/// A wide light tree of arity `N`.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Tlas<const N: usize> {
-    /// The root first; a child always after its parent. Empty where there is no leaf or a single one.
-    pub(crate) nodes: Vec<Node<N>>,
-    /// One a node.
-    pub(crate) parents: Vec<Slot>,
-    /// One a node.
-    pub(crate) spreads: Vec<Spread>,
-    /// One a leaf.
-    pub(crate) leaves: Vec<Slot>,
-}
-
-impl<const N: usize> Tlas<N> {
-    /// The tree as borrowed slices, which all sampling works on.
-    #[inline]
-    pub(crate) fn view(&self) -> TlasView<'_, N> {
-        TlasView { nodes: &self.nodes, parents: &self.parents, spreads: &self.spreads, leaves: &self.leaves }
-    }
-}
-
-/// A light tree in borrowed memory.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct TlasView<'a, const N: usize> {
-    pub(crate) nodes: &'a [Node<N>],
-    pub(crate) parents: &'a [Slot],
-    pub(crate) spreads: &'a [Spread],
-    pub(crate) leaves: &'a [Slot],
 }

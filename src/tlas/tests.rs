@@ -4,10 +4,11 @@ use alloc::vec::Vec;
 
 use glam::Vec3;
 
-use super::node::{Child, TlasView};
+use super::node::Child;
+use super::tree::WideTree;
 use super::walk::descend::{Descent, PmfWalk, SampleWalk};
 use super::walk::ray::{Crossed, Met};
-use super::{LeafOracle, Splitting, Tlas};
+use super::{Arity, LeafOracle, Splitting, Tlas, TlasView};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::record::ShadingPoint;
@@ -18,19 +19,24 @@ use crate::warp::{Variate, seed};
 type Light = (LightBounds, Moments);
 
 /// The tree over lights, and the lights in the order of its leaves.
-pub(super) fn build<const N: usize>(lights: &[Light]) -> (Tlas<N>, Vec<u32>) {
+pub(super) fn build(arity: Arity, lights: &[Light]) -> (Tlas, Vec<u32>) {
     let (mut tlas, order) =
-        super::build(lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
+        super::build(arity, lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
     tlas.fit(&|leaf| lights[order[leaf as usize] as usize]);
     (tlas, order)
+}
+
+/// The arity with this number of lanes.
+fn arity<const N: usize>() -> Arity {
+    Arity::from_code(N as u32).expect("there is such an arity")
 }
 
 /// Leaves are all visible, and portals show the same in every direction.
 struct Open;
 
 impl LeafOracle for Open {
-    fn radiances<const N: usize>(&self, _centers: &[[f32; N]; 3], _radii: &[f32; N], _set: u32) -> [f32; N] {
-        [1.0; N]
+    fn radiances(&self, _centers: [&[f32]; 3], _radii: &[f32], _set: u32, radiances: &mut [f32]) {
+        radiances.fill(1.0);
     }
 
     fn is_visible(&self, _leaf: u32) -> bool {
@@ -42,8 +48,8 @@ impl LeafOracle for Open {
 struct Odd;
 
 impl LeafOracle for Odd {
-    fn radiances<const N: usize>(&self, _centers: &[[f32; N]; 3], _radii: &[f32; N], _set: u32) -> [f32; N] {
-        [1.0; N]
+    fn radiances(&self, _centers: [&[f32]; 3], _radii: &[f32], _set: u32, radiances: &mut [f32]) {
+        radiances.fill(1.0);
     }
 
     fn is_visible(&self, leaf: u32) -> bool {
@@ -80,30 +86,30 @@ fn shading_point(i: usize, pcg: &mut Pcg32) -> ShadingPoint {
 }
 
 /// Probability of ending below a node where every weight is zero.
-fn dead_mass<const N: usize>(tlas: &TlasView<'_, N>, node: usize, x: &ShadingPoint, scene: &impl LeafOracle) -> f64 {
-    let weights = tlas.nodes[node].weigh(x, scene);
+fn dead_mass<const N: usize>(tlas: &WideTree<'_, N>, node: usize, x: &ShadingPoint, oracle: &impl LeafOracle) -> f64 {
+    let weights = tlas.nodes[node].weigh(x, oracle);
     if weights == [0.0; N] {
         return 1.0;
     }
     let below = |lane| match tlas.nodes[node].child(lane) {
         Child::Node(index) if weights[lane] > 0.0 => {
-            crate::warp::pmf_wide(&weights, lane) * dead_mass(tlas, index as usize, x, scene)
+            crate::warp::pmf_wide(&weights, lane) * dead_mass(tlas, index as usize, x, oracle)
         }
         _ => 0.0,
     };
     (0..N).map(below).sum()
 }
 
-fn probabilities_sum_to_one<const N: usize>(scene: &impl LeafOracle) {
+fn probabilities_sum_to_one<const N: usize>(oracle: &impl LeafOracle) {
     let mut pcg = Pcg32::new(3, 1);
     for n in [2, 3, 17, 100, 3000] {
-        let (tlas, _) = build::<N>(&cloud(n, &mut pcg));
+        let (tlas, _) = build(arity::<N>(), &cloud(n, &mut pcg));
         let view = tlas.view();
         view.validate().expect("a built tree is valid");
         for i in 0..12 {
             let x = shading_point(i, &mut pcg);
-            let leaves: f64 = (0..n as u32).map(|leaf| view.pmf(leaf, &x, scene, None)).sum();
-            let dead = dead_mass(&view, 0, &x, scene);
+            let leaves: f64 = (0..n as u32).map(|leaf| view.pmf(leaf, &x, oracle, None)).sum();
+            let dead = dead_mass(&view.wide::<N>(), 0, &x, oracle);
             assert!((leaves + dead - 1.0).abs() < 1e-9, "{n} lights: {leaves} + {dead}");
         }
     }
@@ -120,7 +126,7 @@ fn leaves_and_dead_ends_have_all_the_probability() {
 #[test]
 fn a_sample_has_the_probability_of_its_leaf() {
     let mut pcg = Pcg32::new(4, 1);
-    let (tlas, _) = build::<8>(&cloud(5000, &mut pcg));
+    let (tlas, _) = build(Arity::Eight, &cloud(5000, &mut pcg));
     let view = tlas.view();
     for i in 0..20_000 {
         let x = shading_point(i, &mut pcg);
@@ -148,8 +154,8 @@ fn all_instruction_sets_give_the_same_bits() {
 }
 
 fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg: &mut Pcg32) {
-    let (tlas, _) = build::<N>(lights);
-    let tlas = &tlas.view();
+    let (tlas, _) = build(arity::<N>(), lights);
+    let tlas = &tlas.view().wide::<N>();
     let mut found = 0;
     for i in 0..3000 {
         let x = &shading_point(i, pcg);
@@ -157,7 +163,7 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let u = pcg.next_f32();
         let draw = |level: InstructionSet| {
             let drawn = level.run(SampleWalk { tlas, walk: Descent::new(x, &Odd, Variate::new(u, seed(&[u]))) });
-            let pmf = drawn.map(|(leaf, _)| level.run(PmfWalk { tlas, leaf, x, scene: &Odd, first: None }).to_bits());
+            let pmf = drawn.map(|(leaf, _)| level.run(PmfWalk { tlas, leaf, x, oracle: &Odd, first: None }).to_bits());
             (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), pmf)
         };
         let mut all = InstructionSet::all().map(draw);
@@ -181,7 +187,7 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
 fn lights_are_a_permutation_in_the_order_of_leaves() {
     let mut pcg = Pcg32::new(5, 1);
     for n in [1, 2, 9, 1000] {
-        let (_, order) = build::<8>(&cloud(n, &mut pcg));
+        let (_, order) = build(Arity::Eight, &cloud(n, &mut pcg));
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert!(sorted.iter().copied().eq(0..n as u32));
@@ -203,10 +209,10 @@ fn coincident_and_chained_lights_make_shallow_trees() {
     };
     let chain: Vec<_> = (0..640).map(moved).collect();
     for lights in [same, chain] {
-        let (tlas, _) = build::<4>(&lights);
+        let (tlas, _) = build(Arity::Four, &lights);
         let view = tlas.view();
         view.validate().expect("a built tree is valid");
-        let depth = (0..lights.len() as u32).map(|leaf| view.path(leaf).count()).max();
+        let depth = (0..lights.len() as u32).map(|leaf| view.wide::<4>().path(leaf).count()).max();
         assert!(depth < Some(70), "{depth:?}");
     }
 }
@@ -215,7 +221,7 @@ fn coincident_and_chained_lights_make_shallow_trees() {
 fn a_ray_finds_every_box_that_it_crosses() {
     let mut pcg = Pcg32::new(7, 1);
     let lights = cloud(2000, &mut pcg);
-    let (tlas, order) = build::<8>(&lights);
+    let (tlas, order) = build(Arity::Eight, &lights);
     for i in 0..300 {
         let origin = shading_point(i, &mut pcg).position;
         let direction = if i % 5 == 0 { [Vec3::X, Vec3::NEG_Y, Vec3::Z][i % 3] } else { pcg.direction() };
@@ -249,7 +255,7 @@ fn passes_through(origin: Vec3, direction: Vec3, aabb: &Aabb) -> bool {
     enter < leave - 1e-6
 }
 
-fn visits(tlas: &Tlas<8>, x: &ShadingPoint, u: f32, splitting: &Splitting) -> Vec<(u32, f64)> {
+fn visits(tlas: &Tlas, x: &ShadingPoint, u: f32, splitting: &Splitting) -> Vec<(u32, f64)> {
     let mut visits = Vec::new();
     let variate = |draw| Variate::scrambled(u, u64::from(draw), seed(&[u]) ^ u64::from(draw));
     tlas.view().sample_split(x, &Odd, splitting, variate, |leaf, count| visits.push((leaf, count)));
@@ -259,7 +265,7 @@ fn visits(tlas: &Tlas<8>, x: &ShadingPoint, u: f32, splitting: &Splitting) -> Ve
 #[test]
 fn split_visits_have_their_expected_counts() {
     let mut pcg = Pcg32::new(8, 1);
-    let (tlas, _) = build::<8>(&cloud(500, &mut pcg));
+    let (tlas, _) = build(Arity::Eight, &cloud(500, &mut pcg));
     let mut most = 0;
     for i in 0..2000 {
         let x = shading_point(i, &mut pcg);
@@ -279,7 +285,7 @@ fn split_visits_have_their_expected_counts() {
 #[test]
 fn without_splitting_there_is_one_visit_like_a_plain_sample() {
     let mut pcg = Pcg32::new(9, 1);
-    let (tlas, _) = build::<8>(&cloud(300, &mut pcg));
+    let (tlas, _) = build(Arity::Eight, &cloud(300, &mut pcg));
     for i in 0..500 {
         let x = shading_point(i, &mut pcg);
         for splitting in [Splitting { threshold: 0.0, levels: 9 }, Splitting { threshold: 1.0, levels: 0 }] {
@@ -295,12 +301,12 @@ fn without_splitting_there_is_one_visit_like_a_plain_sample() {
 #[test]
 fn broken_trees_are_refused() {
     let mut pcg = Pcg32::new(10, 1);
-    let (tlas, _) = build::<4>(&cloud(50, &mut pcg));
-    let word_count = size_of_val(&tlas.nodes[..]) / 4;
+    let (tlas, _) = build(Arity::Four, &cloud(50, &mut pcg));
+    let word_count = tlas.nodes.len();
     let mut refused = 0;
     for word in 0..word_count {
         let mut broken = tlas.clone();
-        bytemuck::cast_slice_mut::<_, u32>(&mut broken.nodes)[word] ^= 0x8000_0001;
+        broken.nodes[word] ^= 0x8000_0001;
         // What passes must still be safe to walk.
         match broken.view().validate() {
             Err(_) => refused += 1,

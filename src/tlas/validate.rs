@@ -1,15 +1,26 @@
 //! Checks of a tree that comes from outside, after which no walk can leave it or go round in circles.
 
-use super::node::{Child, Node, Slot, TlasView, wide};
+use super::arity::Arity;
+use super::node::{Child, Node, Slot, wide};
+use super::tree::{TlasView, WideTree, for_arity};
 use crate::error::Error;
 
 /// Largest coordinate and largest step of a box: what is made of them stays finite.
 const FAR: f32 = 1e15;
 
-impl<const N: usize> TlasView<'_, N> {
-    /// Whether every reference stays inside and points forward, every parent pointer leads back, every leaf is
-    /// referred to once, and every value is finite and in its range.
+impl TlasView<'_> {
+    /// Checks that the words are whole nodes, every reference stays inside and points forward, every parent pointer
+    /// leads back, every leaf is referred to once, and every value is finite and in its range.
     pub(crate) fn validate(&self) -> Result<(), Error> {
+        for_arity!(self, tree => {
+            Error::unless_equal("number of bytes of nodes", size_of_val(self.nodes), size_of_val(tree.nodes))?;
+            tree.validate()
+        })
+    }
+}
+
+impl<const N: usize> WideTree<'_, N> {
+    fn validate(&self) -> Result<(), Error> {
         Error::unless_equal("number of parents", self.parents.len(), self.nodes.len())?;
         Error::unless_equal("number of spreads", self.spreads.len(), self.nodes.len())?;
         if self.nodes.is_empty() {

@@ -22,7 +22,7 @@ pub(crate) trait Lights: Sync {
     fn sample_from_bytes(&self, points: &[(ShadingPoint, [f32; 3])]) -> Vec<Option<LightSample>>;
 }
 
-impl<const N: usize, const M: usize> Lights for LightSampler<N, M> {
+impl<const M: usize> Lights for LightSampler<M> {
     fn at<'a>(&'a self, x: &ShadingPoint) -> Box<dyn Point + 'a> {
         Box::new(LightSampler::at(self, x))
     }
@@ -67,7 +67,7 @@ impl<const N: usize, const M: usize> Lights for LightSampler<N, M> {
 
     fn sample_from_bytes(&self, points: &[(ShadingPoint, [f32; 3])]) -> Vec<Option<LightSample>> {
         let words = aligned(&self.to_bytes());
-        let view = LightSamplerView::<N, M>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+        let view = LightSamplerView::<M>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
         let mut samples = vec![None; points.len()];
         view.sample_many(points, &mut samples);
         samples
@@ -83,7 +83,7 @@ pub(crate) trait Point {
     fn pdf_sample_direction(&self, sample: &LightSample) -> f32;
 }
 
-impl<const N: usize, const M: usize> Point for PointSampler<'_, N, M> {
+impl<const M: usize> Point for PointSampler<'_, M> {
     fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
         PointSampler::sample(self, u)
     }

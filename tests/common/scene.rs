@@ -1,8 +1,8 @@
 //! Scenes as plain descriptions, from which a sampler is built and an oracle computes.
 
 use fanlight::{
-    Environment, Filter, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver, ShadingPoint, Sides, Texture,
-    Weight, Wrap,
+    Arity, Environment, Filter, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver, ShadingPoint, Sides,
+    Texture, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -220,9 +220,9 @@ impl Scene {
         environment.and_then(|e| e.with_rotation(self.rotation)).expect("the environment is valid")
     }
 
-    pub(crate) fn build<const N: usize, const M: usize>(&self) -> LightSampler<N, M> {
-        let mut builder = LightSamplerBuilder::<N, M>::new();
-        builder.environment(self.environment()).illumination(self.illumination);
+    pub(crate) fn build<const N: usize, const M: usize>(&self) -> LightSampler<M> {
+        let mut builder = LightSamplerBuilder::<M>::new();
+        builder.environment(self.environment()).illumination(self.illumination).arity(arity(N));
         let textures: Vec<_> = self.images.iter().map(|image| builder.add_texture(image.texture())).collect();
         for light in &self.meshes {
             let mesh = if light.portal { Mesh::portal } else { Mesh::emitter };
@@ -241,6 +241,12 @@ impl Scene {
     pub(crate) fn triangles(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.meshes.iter().enumerate().flat_map(|(m, mesh)| (0..mesh.indices.len()).map(move |t| (m, t)))
     }
+}
+
+/// The arity with this number of lanes.
+pub(crate) fn arity(lanes: usize) -> Arity {
+    let arities = [Arity::Four, Arity::Eight, Arity::Sixteen];
+    arities.into_iter().find(|arity| arity.lanes() == lanes).expect("there is such an arity")
 }
 
 /// A shading point in and around the unit cube: 0 surface, 1 transmissive, 2 volume.

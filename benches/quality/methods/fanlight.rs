@@ -1,23 +1,30 @@
 //! The crate itself.
 
-use ::fanlight::{Hit, Illumination, LightSample, LightSampler, LightSamplerBuilder, Mesh, ShadingPoint, Weight};
+use ::fanlight::{
+    Arity, Hit, Illumination, LightSample, LightSampler, LightSamplerBuilder, Mesh, ShadingPoint, Weight,
+};
 
 use super::{Drawn, Method};
 use crate::scenes::sky::environment;
 use crate::scenes::{Scene, Weight as SceneWeight};
 
-/// `N` is the arity of the tree over triangles, by default that of the crate.
-pub(crate) struct Fanlight<'a, const N: usize = 16> {
+pub(crate) struct Fanlight<'a> {
     scene: &'a Scene,
-    sampler: LightSampler<N>,
+    sampler: LightSampler,
     /// Whether a ray can cross several portals, so that the density of a point is not that of its direction.
     layered: bool,
 }
 
-impl<'a, const N: usize> Fanlight<'a, N> {
+impl<'a> Fanlight<'a> {
     /// The crate with its defaults, or with another term inside of triangles.
     pub(crate) fn new(scene: &'a Scene, illumination: Option<Illumination>) -> Self {
+        Self::of_arity(scene, illumination, Arity::default())
+    }
+
+    /// The crate with another arity of the tree over triangles.
+    pub(crate) fn of_arity(scene: &'a Scene, illumination: Option<Illumination>, arity: Arity) -> Self {
         let mut builder = LightSamplerBuilder::new();
+        builder.arity(arity);
         if let Some(illumination) = illumination {
             builder.illumination(illumination);
         }
@@ -40,8 +47,8 @@ impl<'a, const N: usize> Fanlight<'a, N> {
     }
 }
 
-impl<const N: usize> Fanlight<'_, N> {
-    pub(crate) fn sampler(&self) -> &LightSampler<N> {
+impl Fanlight<'_> {
+    pub(crate) fn sampler(&self) -> &LightSampler {
         &self.sampler
     }
 
@@ -58,7 +65,7 @@ impl<const N: usize> Fanlight<'_, N> {
     }
 }
 
-impl<const N: usize> Method for Fanlight<'_, N> {
+impl Method for Fanlight<'_> {
     #[inline]
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
         let sample = self.sampler.sample(x, u)?;

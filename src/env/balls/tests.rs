@@ -40,7 +40,8 @@ fn compare(sky: &Environment) -> u32 {
         let radii: [f32; 8] = core::array::from_fn(|_| 2.0 * pcg.next_f32() * pcg.next_f32());
         let by_axis = [0, 1, 2].map(|axis| centers.map(|center| center[axis]));
         let set = pcg.next_u32() & 0xff;
-        let values = view.averages_of_balls(&by_axis, &radii, set);
+        let mut values = [0.0; 8];
+        view.averages_of_balls([&by_axis[0], &by_axis[1], &by_axis[2]], &radii, set, &mut values);
         for i in 0..8 {
             let alone = view.average(&Footprint::ball(centers[i], radii[i])).value;
             match (set >> i & 1, alone > 0.0) {
@@ -72,7 +73,9 @@ fn compare(sky: &Environment) -> u32 {
 fn any_ball_has_a_number() {
     const VALUES: [f32; 7] = [0.0, -0.0, 1e-45, 1e38, f32::MAX, f32::INFINITY, f32::NAN];
     for (below, value) in [0.0, 1.0].into_iter().flat_map(|below| VALUES.map(|value| (below, value))) {
-        let values = sky(below).as_view().averages_of_balls(&[[value; 4], [0.0; 4], [1.0; 4]], &[value; 4], 0xf);
+        let mut values = [0.0; 4];
+        let centers: [&[f32]; 3] = [&[value; 4], &[0.0; 4], &[1.0; 4]];
+        sky(below).as_view().averages_of_balls(centers, &[value; 4], 0xf, &mut values);
         assert!(values.iter().all(|value| value.is_finite() && *value >= 0.0), "{value}: {values:?}");
     }
 }

@@ -4,13 +4,15 @@ use alloc::vec::Vec;
 
 use super::binary::BinaryNode;
 use super::forest::{LaneCut, forests};
-use crate::tlas::node::{Node, Slot, Spread, Tlas};
+use crate::tlas::arity::Arity;
+use crate::tlas::node::{Node, Slot, Spread, words};
+use crate::tlas::tree::Tlas;
 
 /// Collapses a binary tree. Returns the wide tree, whose nodes have no bounds yet, with the lights in the order of its
-/// leaves, which follows the tree, so that the lights of one node are neighbours in memory. So are the nodes below one
+/// leaves, which follows the tree, so that the lights of one node are neighbors in memory. So are the nodes below one
 /// node; and what is below the first of them comes before what is below the second.
-pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u32>) {
-    let mut tlas = Tlas { nodes: Vec::new(), parents: Vec::new(), spreads: Vec::new(), leaves: Vec::new() };
+pub(super) fn collapse<const N: usize>(arity: Arity, binary: &[BinaryNode]) -> (Tlas, Vec<u32>) {
+    let mut tlas = Tlas { arity, ..Tlas::default() };
     let mut lights = Vec::with_capacity(binary.len() / 2 + 1);
     if let [leaf] = binary {
         tlas.leaves.push(Slot::ROOT);
@@ -18,7 +20,7 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
         return (tlas, lights);
     }
     let forests = forests::<N>(binary);
-    tlas.push(Slot::ROOT);
+    push::<N>(&mut tlas, Slot::ROOT);
     // Wide nodes that wait for their children, each with its binary node.
     let mut pending = Vec::from([(0, 0)]);
     while let Some((index, root)) = pending.pop() {
@@ -26,12 +28,13 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
         let members = || cut.members().iter().copied();
         let nodes = members().filter(|&below| binary[below].count > 1);
         let leaves = members().filter(|&below| binary[below].count == 1);
-        let first = tlas.nodes.len();
+        let first = tlas.parents.len();
         for lane in 0..nodes.clone().count() {
-            tlas.push(Slot::new::<N>(index, lane));
+            push::<N>(&mut tlas, Slot::new::<N>(index, lane));
         }
-        let node_count = tlas.nodes.len() - first;
-        tlas.nodes[index] = Node::new(first, node_count, lights.len(), cut.members().len());
+        let node_count = tlas.parents.len() - first;
+        let node = Node::<N>::new(first, node_count, lights.len(), cut.members().len());
+        bytemuck::cast_slice_mut(&mut tlas.nodes)[index] = node;
         for (lane, below) in (node_count..).zip(leaves) {
             tlas.leaves.push(Slot::new::<N>(index, lane));
             lights.push(binary[below].link);
@@ -44,10 +47,9 @@ pub(super) fn collapse<const N: usize>(binary: &[BinaryNode]) -> (Tlas<N>, Vec<u
     (tlas, lights)
 }
 
-impl<const N: usize> Tlas<N> {
-    fn push(&mut self, parent: Slot) {
-        self.nodes.push(Node::new(0, 0, 0, 0));
-        self.parents.push(parent);
-        self.spreads.push(Spread::default());
-    }
+/// Appends a node whose children are not known yet.
+fn push<const N: usize>(tlas: &mut Tlas, parent: Slot) {
+    tlas.nodes.resize(tlas.nodes.len() + words::<N>(), 0);
+    tlas.parents.push(parent);
+    tlas.spreads.push(Spread::default());
 }

@@ -6,7 +6,9 @@ use smallvec::SmallVec;
 
 use crate::bounds::{LightBounds, Moments};
 use crate::parallel;
-use crate::tlas::node::{Child, Node, Spread, Tlas};
+use crate::tlas::arity::{Arity, MAX_LANES};
+use crate::tlas::node::{Child, Node, Spread};
+use crate::tlas::tree::Tlas;
 
 /// A node and all nodes below it, which are neighbours in memory.
 struct Subtree<'a, const N: usize> {
@@ -32,11 +34,20 @@ struct Fitted {
     cost: f64,
 }
 
-impl<const N: usize> Tlas<N> {
-    /// Gives all nodes the bounds of the lights below, and tells the tree's cost: that of all clusters in the surface
+impl Tlas {
+    /// Gives all nodes the bounds of the lights below. Returns the tree's cost: that of all clusters in the surface
     /// area orientation heuristic, relative to that of the root.
     pub(crate) fn fit(&mut self, light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync)) -> f64 {
-        let [node, below @ ..] = &mut self.nodes[..] else { return 1.0 };
+        match self.arity {
+            Arity::Four => self.fit_nodes::<4>(light),
+            Arity::Eight => self.fit_nodes::<8>(light),
+            Arity::Sixteen => self.fit_nodes::<16>(light),
+        }
+    }
+
+    fn fit_nodes<const N: usize>(&mut self, light: &(impl Fn(u32) -> (LightBounds, Moments) + Sync)) -> f64 {
+        let nodes: &mut [Node<N>] = bytemuck::cast_slice_mut(&mut self.nodes);
+        let [node, below @ ..] = nodes else { return 1.0 };
         let [spread, spreads @ ..] = &mut self.spreads[..] else { return 1.0 };
         let root = Subtree { node, spread, first: 1, below, spreads, fitted: Fitted::NONE }.fit(light);
         if root.sum > 0.0 {
@@ -54,14 +65,14 @@ impl<const N: usize> Subtree<'_, N> {
         let size = subtrees.iter().map(|subtree| 1 + subtree.below.len()).sum();
         parallel::for_each(&mut subtrees, size, |subtree| subtree.fitted = subtree.fit(light));
         let mut subtrees = subtrees.iter();
-        let lanes: SmallVec<[Fitted; 16]> = (0..N)
+        let lanes: SmallVec<[Fitted; MAX_LANES]> = (0..N)
             .filter_map(|lane| match self.node.child(lane) {
                 Child::Empty => None,
                 Child::Leaf(leaf) => Some(Fitted::leaf(light(leaf))),
                 Child::Node(_) => subtrees.next().map(|subtree| subtree.fitted),
             })
             .collect();
-        let known: SmallVec<[_; 16]> = lanes.iter().map(|lane| (lane.bounds, lane.moments)).collect();
+        let known: SmallVec<[_; MAX_LANES]> = lanes.iter().map(|lane| (lane.bounds, lane.moments)).collect();
         self.node.set(&known);
         let whole = lanes.iter().copied().reduce(|whole, lane| whole.union(&lane)).unwrap_or(Fitted::NONE);
         *self.spread = whole.spread();
@@ -76,7 +87,7 @@ fn divide<'a, const N: usize>(
     first: usize,
     nodes: &'a mut [Node<N>],
     spreads: &'a mut [Spread],
-) -> SmallVec<[Subtree<'a, N>; 16]> {
+) -> SmallVec<[Subtree<'a, N>; MAX_LANES]> {
     let end = first + nodes.len();
     let children = usize::from(node.node_count);
     let (nodes, mut below) = nodes.split_at_mut(children);

@@ -22,17 +22,19 @@ pub(crate) use progress::Report;
 
 use crate::bounds::LightBounds;
 use crate::parallel;
-use crate::tlas::node::Tlas;
+use crate::tlas::arity::Arity;
+use crate::tlas::tree::Tlas;
 
-/// Arranges `count` lights, of which `light` tells the bounds, in a tree of arity `N`. Returns it with the lights in the
-/// order of its leaves; its nodes know no bounds until [`Tlas::fit`].
-pub(crate) fn build<const N: usize>(
+/// Arranges `count` lights, of which `light` tells the bounds, in a tree. Returns it with the lights in the order of its
+/// leaves; its nodes know no bounds until [`Tlas::fit`].
+pub(crate) fn build(
+    arity: Arity,
     count: usize,
     light: &(impl Fn(u32) -> LightBounds + Sync),
     report: Option<Report<'_>>,
-) -> Result<(Tlas<N>, Vec<u32>), Cancelled> {
+) -> Result<(Tlas, Vec<u32>), Cancelled> {
     if count == 0 {
-        return Ok((Tlas::default(), Vec::new()));
+        return Ok((Tlas { arity, ..Tlas::default() }, Vec::new()));
     }
     let progress = Progress::new(report, count);
     let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
@@ -40,5 +42,9 @@ pub(crate) fn build<const N: usize>(
     subdivide(&mut items, &mut binary, 0, &progress);
     progress.check()?;
     drop(items);
-    Ok(collapse(&binary))
+    Ok(match arity {
+        Arity::Four => collapse::<4>(arity, &binary),
+        Arity::Eight => collapse::<8>(arity, &binary),
+        Arity::Sixteen => collapse::<16>(arity, &binary),
+    })
 }

@@ -4,7 +4,8 @@
 use glam::Vec3;
 
 use super::importance::clamped_mean;
-use crate::tlas::node::{Child, Node, TlasView};
+use crate::tlas::node::{Child, Node};
+use crate::tlas::tree::WideTree;
 use crate::warp::{Variate, keep_possible, pick, pmf, sum};
 
 /// Of the spread of a cluster's normals, what counts as variance of a cosine.
@@ -69,7 +70,7 @@ impl<const N: usize> Node<N> {
     }
 }
 
-impl<const N: usize> TlasView<'_, N> {
+impl<const N: usize> WideTree<'_, N> {
     /// Draws a leaf by what it sends out. Returns it with its probability. A tree of one leaf gives that leaf.
     pub(crate) fn sample_outgoing(&self, outgoing: &Outgoing, u: &mut Variate) -> Option<(u32, f64)> {
         if self.nodes.is_empty() {

@@ -3,7 +3,9 @@
 use super::importance::{LeafOracle, ReceiverLanes};
 use crate::record::ShadingPoint;
 use crate::simd::{InstructionSet, Kernel, prefetch};
-use crate::tlas::node::{Child, Node, TlasView};
+use crate::tlas::arity::MAX_LANES;
+use crate::tlas::node::{Child, Node};
+use crate::tlas::tree::WideTree;
 use crate::warp::{Variate, pick_wide, pmf_wide};
 
 /// Walks that take turns: enough to hide what one waits for, few enough to stay in the cache.
@@ -11,8 +13,8 @@ pub(crate) const TURNS: usize = 8;
 
 /// A way down the tree, as far as it has got.
 pub(crate) struct Descent<S> {
-    sight: ReceiverLanes,
-    scene: S,
+    receiver: ReceiverLanes,
+    oracle: S,
     u: Variate,
     node: u32,
     /// Probability of getting here.
@@ -24,8 +26,8 @@ pub(crate) struct Descent<S> {
 impl<S: LeafOracle> Descent<S> {
     /// From the root.
     #[inline(always)]
-    pub(crate) fn new(x: &ShadingPoint, scene: S, u: Variate) -> Self {
-        Self { sight: ReceiverLanes::new(x), scene, u, node: 0, pmf: 1.0, end: None }
+    pub(crate) fn new(x: &ShadingPoint, oracle: S, u: Variate) -> Self {
+        Self { receiver: ReceiverLanes::new(x), oracle, u, node: 0, pmf: 1.0, end: None }
     }
 
     /// The leaf that was drawn, with its probability.
@@ -36,9 +38,9 @@ impl<S: LeafOracle> Descent<S> {
 
     /// Goes on to a child, unless this is the end.
     #[inline(always)]
-    fn step<const N: usize>(&mut self, tlas: &TlasView<'_, N>) {
+    fn step<const N: usize>(&mut self, tlas: &WideTree<'_, N>) {
         let node = &tlas.nodes[self.node as usize];
-        self.choose(node, &node.weights(&self.sight, &self.scene));
+        self.choose(node, &node.weights(&self.receiver, &self.oracle));
     }
 
     /// Chooses a child by the weights of all.
@@ -57,9 +59,30 @@ impl<S: LeafOracle> Descent<S> {
     }
 }
 
+/// Weights of the root's children, zero in the lanes that the arity does not have.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FirstWeights([f32; MAX_LANES]);
+
+impl FirstWeights {
+    fn new<const N: usize>(weights: [f32; N]) -> Self {
+        Self(core::array::from_fn(|lane| if lane < N { weights[lane] } else { 0.0 }))
+    }
+
+    #[inline(always)]
+    fn lanes<const N: usize>(&self) -> [f32; N] {
+        core::array::from_fn(|lane| self.0[lane])
+    }
+
+    /// Returns the sum of all weights: an estimate of the irradiance in units of the sum of all energies.
+    #[inline]
+    pub(crate) fn sum(&self) -> f32 {
+        self.0.iter().sum()
+    }
+}
+
 /// One way down to a leaf.
 pub(in crate::tlas) struct SampleWalk<'a, const N: usize, S> {
-    pub(in crate::tlas) tlas: &'a TlasView<'a, N>,
+    pub(in crate::tlas) tlas: &'a WideTree<'a, N>,
     pub(in crate::tlas) walk: Descent<S>,
 }
 
@@ -78,7 +101,7 @@ impl<const N: usize, S: LeafOracle> Kernel for SampleWalk<'_, N, S> {
 /// Several ways down, one step each in turn, and each step in two halves: while one way waits for memory or for sums,
 /// the others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
 struct InterleavedWalks<'a, const N: usize, S> {
-    tlas: &'a TlasView<'a, N>,
+    tlas: &'a WideTree<'a, N>,
     walks: &'a mut [Descent<S>],
 }
 
@@ -92,7 +115,7 @@ impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
             let mut going = true;
             while going {
                 for (walk, weights) in walks.iter().zip(&mut weights).filter(|(walk, _)| walk.end.is_none()) {
-                    *weights = self.tlas.nodes[walk.node as usize].weights(&walk.sight, &walk.scene);
+                    *weights = self.tlas.nodes[walk.node as usize].weights(&walk.receiver, &walk.oracle);
                 }
                 going = false;
                 for (walk, weights) in walks.iter_mut().zip(&weights).filter(|(walk, _)| walk.end.is_none()) {
@@ -107,12 +130,12 @@ impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
 
 /// The way back from a leaf: the probability that [`SampleWalk`] takes it.
 pub(in crate::tlas) struct PmfWalk<'a, const N: usize, S> {
-    pub(in crate::tlas) tlas: &'a TlasView<'a, N>,
+    pub(in crate::tlas) tlas: &'a WideTree<'a, N>,
     pub(in crate::tlas) leaf: u32,
     pub(in crate::tlas) x: &'a ShadingPoint,
-    pub(in crate::tlas) scene: &'a S,
+    pub(in crate::tlas) oracle: &'a S,
     /// Weights of the root, if they are known.
-    pub(in crate::tlas) first: Option<&'a [f32; N]>,
+    pub(in crate::tlas) first: Option<&'a FirstWeights>,
 }
 
 impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
@@ -122,13 +145,13 @@ impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
     fn run(self) -> f64 {
         // The way is short to find, but its nodes are far apart in memory.
         self.tlas.path(self.leaf).for_each(|(node, _)| prefetch(&self.tlas.nodes[node]));
-        let sight = ReceiverLanes::new(self.x);
+        let receiver = ReceiverLanes::new(self.x);
         let mut pmf = 1.0;
         // Not a fold, whose closure would be compiled for the baseline.
         for (node, lane) in self.tlas.path(self.leaf) {
             pmf *= match self.first {
-                Some(weights) if node == 0 => pmf_wide(weights, lane),
-                _ => pmf_wide(&self.tlas.nodes[node].weights(&sight, self.scene), lane),
+                Some(weights) if node == 0 => pmf_wide(&weights.lanes::<N>(), lane),
+                _ => pmf_wide(&self.tlas.nodes[node].weights(&receiver, self.oracle), lane),
             };
         }
         pmf
@@ -139,7 +162,7 @@ impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
 struct NodeWeights<'a, const N: usize, S> {
     node: &'a Node<N>,
     x: &'a ShadingPoint,
-    scene: &'a S,
+    oracle: &'a S,
 }
 
 impl<const N: usize, S: LeafOracle> Kernel for NodeWeights<'_, N, S> {
@@ -147,31 +170,31 @@ impl<const N: usize, S: LeafOracle> Kernel for NodeWeights<'_, N, S> {
 
     #[inline(always)]
     fn run(self) -> [f32; N] {
-        self.node.weights(&ReceiverLanes::new(self.x), self.scene)
+        self.node.weights(&ReceiverLanes::new(self.x), self.oracle)
     }
 }
 
 impl<const N: usize> Node<N> {
     /// Weight of every child.
-    pub(in crate::tlas) fn weigh(&self, x: &ShadingPoint, scene: &impl LeafOracle) -> [f32; N] {
-        InstructionSet::best().run(NodeWeights { node: self, x, scene })
+    pub(in crate::tlas) fn weigh(&self, x: &ShadingPoint, oracle: &impl LeafOracle) -> [f32; N] {
+        InstructionSet::best().run(NodeWeights { node: self, x, oracle })
     }
 }
 
-impl<const N: usize> TlasView<'_, N> {
+impl<const N: usize> WideTree<'_, N> {
     /// Draws a leaf. Returns it with its probability; `None` where nothing can arrive from the part of the tree
     /// that `u` leads to. `first` are [`Self::first_weights`], if they are known.
     pub(crate) fn sample(
         &self,
         x: &ShadingPoint,
-        scene: &impl LeafOracle,
-        first: Option<&[f32; N]>,
+        oracle: &impl LeafOracle,
+        first: Option<&FirstWeights>,
         u: Variate,
     ) -> Option<(u32, f64)> {
-        let Some(root) = self.nodes.first() else { return self.single_leaf(scene).then_some((0, 1.0)) };
-        let mut walk = Descent::new(x, scene, u);
+        let Some(root) = self.nodes.first() else { return self.single_leaf(oracle).then_some((0, 1.0)) };
+        let mut walk = Descent::new(x, oracle, u);
         if let Some(weights) = first {
-            walk.choose(root, weights);
+            walk.choose(root, &weights.lanes());
         }
         InstructionSet::best().run(SampleWalk { tlas: self, walk })
     }
@@ -181,10 +204,10 @@ impl<const N: usize> TlasView<'_, N> {
         &self,
         node: usize,
         x: &ShadingPoint,
-        scene: &impl LeafOracle,
+        oracle: &impl LeafOracle,
         u: Variate,
     ) -> Option<(u32, f64)> {
-        let walk = Descent { node: node as u32, ..Descent::new(x, scene, u) };
+        let walk = Descent { node: node as u32, ..Descent::new(x, oracle, u) };
         InstructionSet::best().run(SampleWalk { tlas: self, walk })
     }
 
@@ -192,7 +215,7 @@ impl<const N: usize> TlasView<'_, N> {
     pub(crate) fn sample_many(&self, walks: &mut [Descent<impl LeafOracle>]) {
         if self.nodes.is_empty() {
             for walk in walks {
-                walk.end = Some(self.single_leaf(&walk.scene).then_some(0));
+                walk.end = Some(self.single_leaf(&walk.oracle).then_some(0));
             }
             return;
         }
@@ -200,26 +223,27 @@ impl<const N: usize> TlasView<'_, N> {
     }
 
     /// Probability with which [`Self::sample`] draws a leaf.
-    pub(crate) fn pmf(&self, leaf: u32, x: &ShadingPoint, scene: &impl LeafOracle, first: Option<&[f32; N]>) -> f64 {
+    pub(crate) fn pmf(
+        &self,
+        leaf: u32,
+        x: &ShadingPoint,
+        oracle: &impl LeafOracle,
+        first: Option<&FirstWeights>,
+    ) -> f64 {
         if self.nodes.is_empty() {
-            return if self.single_leaf(scene) { 1.0 } else { 0.0 };
+            return if self.single_leaf(oracle) { 1.0 } else { 0.0 };
         }
-        InstructionSet::best().run(PmfWalk { tlas: self, leaf, x, scene, first })
+        InstructionSet::best().run(PmfWalk { tlas: self, leaf, x, oracle, first })
     }
 
     /// Weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
     /// energies; `None` for a tree without nodes.
-    pub(crate) fn first_weights(&self, x: &ShadingPoint, scene: &impl LeafOracle) -> Option<[f32; N]> {
-        self.nodes.first().map(|root| root.weigh(x, scene))
-    }
-
-    /// Nodes and lanes on the way from a leaf to the root.
-    pub(in crate::tlas) fn path(&self, leaf: u32) -> impl Iterator<Item = (usize, usize)> {
-        core::iter::successors(self.leaves[leaf as usize].get::<N>(), |&(node, _)| self.parents[node].get::<N>())
+    pub(crate) fn first_weights(&self, x: &ShadingPoint, oracle: &impl LeafOracle) -> Option<FirstWeights> {
+        self.nodes.first().map(|root| FirstWeights::new(root.weigh(x, oracle)))
     }
 
     /// Whether the tree is a single leaf, and that leaf visible.
-    pub(in crate::tlas) fn single_leaf(&self, scene: &impl LeafOracle) -> bool {
-        self.leaves.len() == 1 && scene.is_visible(0)
+    pub(in crate::tlas) fn single_leaf(&self, oracle: &impl LeafOracle) -> bool {
+        self.leaves.len() == 1 && oracle.is_visible(0)
     }
 }

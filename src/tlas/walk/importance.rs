@@ -12,22 +12,25 @@ use crate::record::{Receiver, ShadingPoint};
 use crate::tlas::node::{ALL, Child, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
 use crate::warp::{keep_least, within_range};
 
-/// What the tree asks of the level above.
+/// What the tree asks of the level above about its leaves and about what they show.
 pub(crate) trait LeafOracle {
-    /// Mean radiances, relative to the mean over all directions, of what portals show in the directions from the
-    /// shading point to balls with these centres (by axis, relative to the shading point) and radii. Zero only where
-    /// all of it is black. Only those in a set of bits are asked for.
-    fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N];
+    /// Writes mean radiances, relative to the mean over all directions, of what portals show in the directions from the
+    /// shading point to balls with these centers (by axis, relative to the shading point) and radii. A radiance is zero
+    /// only where all of it is black. All slices are of one length. Only the elements in `set`, a set of bits, are asked
+    /// for; all are zero before.
+    ///
+    /// Must be `#[inline(always)]`: the length is then a constant, and loops over it become vectors.
+    fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]);
 
     /// Whether anything at all can travel from a leaf to the shading point. Asked only where the bounds of a leaf leave
     /// that open.
     fn is_visible(&self, leaf: u32) -> bool;
 }
 
-impl<S: LeafOracle> LeafOracle for &S {
+impl<O: LeafOracle> LeafOracle for &O {
     #[inline(always)]
-    fn radiances<const N: usize>(&self, centers: &[[f32; N]; 3], radii: &[f32; N], set: u32) -> [f32; N] {
-        (**self).radiances(centers, radii, set)
+    fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
+        (**self).radiances(centers, radii, set, radiances);
     }
 
     #[inline(always)]
@@ -101,13 +104,13 @@ struct Estimates<const N: usize> {
 impl<const N: usize> Node<N> {
     /// Weight of every child. All zero where nothing below the node can be visible.
     #[inline(always)]
-    pub(super) fn weights(&self, x: &ReceiverLanes, scene: &impl LeafOracle) -> [f32; N] {
+    pub(super) fn weights(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
         let Estimates { mut weights, mut largest, doubtful } = self.estimates(x);
         if doubtful != 0 {
-            largest = self.ask(scene, &mut weights, doubtful);
+            largest = self.ask(oracle, &mut weights, doubtful);
         }
         if { self.portals } != [0; N] {
-            largest = self.look_through(x, scene, &mut weights);
+            largest = self.look_through(x, oracle, &mut weights);
         }
         keep_least(&mut weights, largest);
         weights
@@ -115,12 +118,12 @@ impl<const N: usize> Node<N> {
 
     /// Asks the level above about leaves in doubt, and returns the bits of the largest weight.
     #[inline(never)]
-    fn ask(&self, scene: &impl LeafOracle, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
+    fn ask(&self, oracle: &impl LeafOracle, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
         while doubtful != 0 {
             let lane = doubtful.trailing_zeros() as usize;
             doubtful &= doubtful - 1;
             let Child::Leaf(leaf) = self.child(lane) else { continue };
-            if !scene.is_visible(leaf) {
+            if !oracle.is_visible(leaf) {
                 weights[lane] = 0.0;
             }
         }
@@ -129,7 +132,7 @@ impl<const N: usize> Node<N> {
 
     /// Multiplies what comes through portals by what is seen there, and returns the bits of the largest weight.
     #[inline(always)]
-    fn look_through(&self, x: &ReceiverLanes, scene: &impl LeafOracle, weights: &mut [f32; N]) -> u32 {
+    fn look_through(&self, x: &ReceiverLanes, oracle: &impl LeafOracle, weights: &mut [f32; N]) -> u32 {
         let (portals, centers, halves) = (self.portals, self.centers, self.halves);
         let origin = Vec3::from_array(self.origin) - x.position;
         let step = Vec3::from_array(self.steps.map(wide));
@@ -142,7 +145,8 @@ impl<const N: usize> Node<N> {
             radii[i] = 0.5 * math::sqrt((half * step).length_squared());
             set |= u32::from((weights[i] > 0.0) & (portals[i] > 0)) << i;
         }
-        let radiances = scene.radiances(&balls, &radii, set);
+        let mut radiances = [0.0; N];
+        oracle.radiances([&balls[0], &balls[1], &balls[2]], &radii, set, &mut radiances);
         let mut largest = 0;
         for i in 0..N {
             let share = f32::from(portals[i]) * (1.0 / f32::from(ALL));

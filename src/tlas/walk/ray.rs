@@ -5,7 +5,8 @@ use glam::Vec3;
 
 use crate::math::{self, at_least, at_most};
 use crate::simd::{InstructionSet, Kernel};
-use crate::tlas::node::{Child, Node, TlasView};
+use crate::tlas::node::{Child, Node};
+use crate::tlas::tree::WideTree;
 
 /// Relative widening of the interval that a ray spends in a box: covers the rounding of its two ends.
 const WIDENING: f32 = 1e-5;
@@ -13,7 +14,7 @@ const WIDENING: f32 = 1e-5;
 /// Levels of the tree of which is kept what is still to be entered. Below them it is found again on the way back.
 const KEPT: usize = 24;
 
-impl<const N: usize> TlasView<'_, N> {
+impl<const N: usize> WideTree<'_, N> {
     /// Calls `visit` for each leaf whose box the ray from `origin` along `direction` (need not be a unit vector)
     /// crosses.
     pub(crate) fn cross(&self, origin: Vec3, direction: Vec3, visit: impl FnMut(u32)) {
@@ -40,7 +41,7 @@ impl<const N: usize> TlasView<'_, N> {
         let (mut node, mut depth, mut lanes) = (0, 0, entered(&self.nodes[0]));
         loop {
             if lanes == 0 {
-                let Some((parent, from)) = self.parents[node].get::<N>() else { return };
+                let Some((parent, from)) = self.parent(node) else { return };
                 (node, depth) = (parent, depth - 1);
                 lanes = waiting
                     .get(depth)

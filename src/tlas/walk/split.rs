@@ -4,7 +4,8 @@
 use super::importance::LeafOracle;
 use crate::math;
 use crate::record::ShadingPoint;
-use crate::tlas::node::{Child, TlasView};
+use crate::tlas::node::Child;
+use crate::tlas::tree::WideTree;
 use crate::warp::{self, Variate};
 
 /// How far a light tree is split.
@@ -30,19 +31,19 @@ struct Measure {
     inverse_scale2: f32,
 }
 
-impl<const N: usize> TlasView<'_, N> {
+impl<const N: usize> WideTree<'_, N> {
     /// Draws a leaf from every part of the tree that splitting visits, each with the density of its kind among all
     /// drawn: `visit(leaf, expected count)`. `variate(i)` gives the number that the i-th draw is made with.
     pub(crate) fn sample_split(
         &self,
         x: &ShadingPoint,
-        scene: &impl LeafOracle,
+        oracle: &impl LeafOracle,
         splitting: &Splitting,
         mut variate: impl FnMut(u32) -> Variate,
         mut visit: impl FnMut(u32, f64),
     ) {
         if self.nodes.is_empty() {
-            if self.single_leaf(scene) {
+            if self.single_leaf(oracle) {
                 visit(0, 1.0);
             }
             return;
@@ -55,9 +56,9 @@ impl<const N: usize> TlasView<'_, N> {
         let mut weights = [0.0; N];
         loop {
             if arriving && depth < splitting.levels && self.is_split(node, x, &measure) {
-                weights = self.nodes[node].weigh(x, scene);
+                weights = self.nodes[node].weigh(x, oracle);
             } else if arriving {
-                if let Some((leaf, count)) = self.sample_below(node, x, scene, variate(draws)) {
+                if let Some((leaf, count)) = self.sample_below(node, x, oracle, variate(draws)) {
                     visit(leaf, count);
                 }
                 draws += 1;
@@ -65,9 +66,9 @@ impl<const N: usize> TlasView<'_, N> {
             }
             arriving = false;
             if lane == N {
-                let Some((parent, from)) = self.parents[node].get::<N>() else { return };
+                let Some((parent, from)) = self.parent(node) else { return };
                 (node, lane, depth) = (parent, from + 1, depth - 1);
-                weights = self.nodes[node].weigh(x, scene);
+                weights = self.nodes[node].weigh(x, oracle);
                 continue;
             }
             match self.nodes[node].child(lane) {
@@ -88,18 +89,18 @@ impl<const N: usize> TlasView<'_, N> {
         &self,
         leaf: u32,
         x: &ShadingPoint,
-        scene: &impl LeafOracle,
+        oracle: &impl LeafOracle,
         splitting: &Splitting,
     ) -> f64 {
         if self.nodes.is_empty() {
-            return self.pmf(leaf, x, scene, None);
+            return self.pmf(leaf, x, oracle, None);
         }
         let measure = self.measure(x, splitting);
         let height = self.path(leaf).count() as u32;
         // A node splits only below split nodes: `count` assumes that all above do, `pmf` that none does.
         let (mut count, mut pmf) = (1.0, 1.0);
         for (i, (node, lane)) in (0..).zip(self.path(leaf)) {
-            let share = warp::pmf_wide(&self.nodes[node].weigh(x, scene), lane);
+            let share = warp::pmf_wide(&self.nodes[node].weigh(x, oracle), lane);
             pmf *= share;
             let depth = height - 1 - i;
             if !(depth < splitting.levels && self.is_split(node, x, &measure)) {

@@ -8,16 +8,17 @@ use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::record::{Receiver, ShadingPoint};
 use crate::testing::Pcg32;
-use crate::tlas::LeafOracle;
-use crate::tlas::node::{Child, Node, TlasView};
+use crate::tlas::node::{Child, Node};
 use crate::tlas::tests::build;
+use crate::tlas::tree::WideTree;
+use crate::tlas::{Arity, LeafOracle};
 
 /// Everything is visible.
 struct Open;
 
 impl LeafOracle for Open {
-    fn radiances<const N: usize>(&self, _centers: &[[f32; N]; 3], _radii: &[f32; N], _set: u32) -> [f32; N] {
-        [1.0; N]
+    fn radiances(&self, _centers: [&[f32]; 3], _radii: &[f32], _set: u32, radiances: &mut [f32]) {
+        radiances.fill(1.0);
     }
 
     fn is_visible(&self, _leaf: u32) -> bool {
@@ -86,7 +87,7 @@ fn is_dark(bounds: &LightBounds, x: &ShadingPoint) -> bool {
 }
 
 /// Checks all leaves below a node. Returns how many lanes were culled.
-fn check(tlas: &TlasView<'_, 8>, node: usize, culled: bool, x: &ShadingPoint, dark: &dyn Fn(u32) -> bool) -> usize {
+fn check(tlas: &WideTree<'_, 8>, node: usize, culled: bool, x: &ShadingPoint, dark: &dyn Fn(u32) -> bool) -> usize {
     let weights = tlas.nodes[node].weigh(x, &Open);
     let mut count = 0;
     for (lane, &weight) in weights.iter().enumerate() {
@@ -108,7 +109,7 @@ fn what_is_culled_is_dark() {
     for (place, scale) in [(0.0, 1.0), (1e6, 100.0), (0.0, 1e-6), (-5e8, 1e9)] {
         for narrow in [true, false] {
             let lights = lights(300, Vec3::splat(place), scale, narrow, &mut pcg);
-            let (tlas, order) = build::<8>(&lights);
+            let (tlas, order) = build(Arity::Eight, &lights);
             for i in 0..200 {
                 let offset = 3.0 * Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32()) - 1.0;
                 // Now and then next to a light.
@@ -119,7 +120,7 @@ fn what_is_culled_is_dark() {
                     _ => ShadingPoint::surface(position, pcg.direction()),
                 };
                 let dark = |leaf: u32| is_dark(&lights[order[leaf as usize] as usize].0, &x);
-                culled += check(&tlas.view(), 0, false, &x, &dark);
+                culled += check(&tlas.view().wide::<8>(), 0, false, &x, &dark);
             }
         }
     }
