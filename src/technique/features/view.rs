@@ -7,7 +7,8 @@ use crate::light::Lit;
 use crate::warp::Variate;
 
 /// Ratio of a cell's to a feature's angular radius up to which the cell counts as one part, however its texture
-/// varies. *Measured* on the window scenes of the bench `quality`.
+/// varies. *Measured* on the scenes with windows of the bench `quality`: the variance of a star-shaped window
+/// where the sun is visible is 0.15 with half, 0.065 with this, and 0.086 with double.
 ///
 /// Larger: fewer parts, so that a shading point is cheaper, but the texture inside a part is followed by the tree's
 /// descent alone. Smaller: more parts, up to the limit of the list.
