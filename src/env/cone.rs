@@ -17,15 +17,16 @@ use crate::math;
 use crate::warp::equal_area::{SPHERE, STRETCH, sphere_to_square, wrap_texel_log2};
 use glam::Vec3;
 
-/// Share of the mean of the bounds (or of a larger region) in an estimate. *Measured* on the window scenes of the bench
-/// `quality`.
+/// Share of the mean of the bounds (or of a larger region) in an estimate. *Measured* on the scenes with windows of
+/// the bench `quality`: half and double change no variance by more than a tenth.
 ///
 /// Larger: where the talk's lookup is right, more of the samples go astray, by this share. Smaller: the variance of a
 /// bright spot that the talk's lookup misses grows with the inverse of this share.
 pub(super) const DEFENSIVE_SHARE: f32 = 0.02;
 
-/// Ratio of least to largest radiance from which a region counts as constant. *Measured* on the window scenes of the
-/// bench `quality`.
+/// Ratio of least to largest radiance from which a region counts as constant. *Measured* on the scenes with windows
+/// of the bench `quality`: 0.3 raises the variance without a visible sun by up to a tenth, 0.8 lowers it by up to a
+/// twentieth.
 ///
 /// Larger: the descent divides more cells, at the cost of time. Smaller: less of the contrast is followed.
 const CONSTANT_RATIO: f32 = 0.6;

@@ -28,8 +28,12 @@ pub(crate) const MAX_FEATURES: usize = 8;
 /// Larger: a longer search in images of even more contrast. Smaller: their features may be missed.
 const MAX_DOUBLINGS: u32 = 40;
 
-/// What counts as a bright feature. The defaults are *measured* on the window scenes of the bench `quality`; none of
-/// them is part of the format, so that environments built with other limits load all the same.
+/// What counts as a bright feature. None of the limits is part of the format: environments built with others load all
+/// the same.
+///
+/// The defaults are *measured* on the scenes with windows of the bench `quality`. With half and with double the
+/// contrast the variance where the sun is visible changes by at most a fifth. Half and double of each other limit
+/// give the same features there, and so the same variance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeatureLimits {
     /// Ratio of the cap to the mean of the capped image. Larger: fewer texels are features, and the trees are guided
@@ -47,7 +51,8 @@ pub(super) struct FeatureLimits {
     /// Most features, at most [`MAX_FEATURES`].
     pub(super) features: usize,
     /// Most texels of a feature after merging. Larger: a finer feature, but a shading point that sees it in part pays
-    /// for every texel. Smaller: texels with larger margins, so that more directions miss the opening.
+    /// for every texel. Smaller: texels with larger margins, so that more directions miss the opening; at 16 the
+    /// variance where the sun is visible is 0.6 instead of 0.003.
     pub(super) texels: usize,
 }
 
