@@ -10,6 +10,7 @@ mod common;
 mod agreement;
 mod build;
 mod chi_square;
+mod docs;
 mod double_check;
 mod emission;
 mod errors;
