@@ -1,6 +1,6 @@
 //! What the documentation calls by name is in the code.
 
-use std::collections::BTreeSet;
+use std::collections::HashSet;
 use std::fs;
 use std::path::Path;
 
@@ -69,7 +69,7 @@ fn names_in_the_documentation_exist() {
     CODE.iter().for_each(|folder| files(&root.join(folder), &mut paths));
     let is_mine = |path: &&std::path::PathBuf| !path.ends_with("suite/docs.rs");
     let read = |path: &Path| fs::read_to_string(path).expect("the file can be read");
-    let mut known: BTreeSet<String> = paths
+    let mut known: HashSet<String> = paths
         .iter()
         .filter(is_mine)
         .flat_map(|path| words(&without_comments(&read(path))).collect::<Vec<_>>())

@@ -2,6 +2,8 @@
 //!
 //! `cargo test NAME` runs a module or a test: `cargo test golden`, `cargo test layering`. Sizes are in [`common::tier`].
 
+#![expect(clippy::incompatible_msrv, reason = "the crate alone is built with its oldest compiler")]
+
 // Shared with the fuzz targets.
 #[path = "../fuzz/checks/mod.rs"]
 mod checks;
