@@ -142,6 +142,11 @@ mod warp;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+/// The steps of the guide.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/INTEGRATION.md")]
+struct Integration;
+
 pub use blas::{Procedural, Texture};
 pub use env::{Environment, EnvironmentImage, EnvironmentSample, EnvironmentView, Poles};
 pub use error::Error;

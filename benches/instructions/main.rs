@@ -2,8 +2,8 @@
 //! idle one, where times are not.
 //!
 //! ```sh
-//! cargo bench --bench instructions              # compares with the baseline, fails if any count grew by more than 5 %
-//! cargo bench --bench instructions -- --update  # writes the baseline
+//! cargo bench -p fanlight-benches --bench instructions              # compares with the baseline, fails if any count grew by more than 5 %
+//! cargo bench -p fanlight-benches --bench instructions -- --update  # writes the baseline
 //! ```
 //!
 //! Cases named `nee` are what a host does at a lit point: `at`, `sample`, and the density of the sampled direction.

@@ -95,7 +95,7 @@ pub(crate) struct Args {
     pub(crate) methods: Vec<String>,
 }
 
-const USAGE: &str = "cargo bench --bench quality -- [--quick] [--json FILE] [--plots DIR] [--workload W]... \
+const USAGE: &str = "cargo bench -p fanlight-benches --bench quality -- [--quick] [--json FILE] [--plots DIR] [--workload W]... \
                      [--method M]... [--points N] [--samples N] \
                      [--table] [--stratification] [--splitting] [--lobes] [--terms] [--room] [--everything]";
 

@@ -1,6 +1,6 @@
 //! How noisy, how fast and how large the crate's sampling is, next to other methods on the same workloads.
 //!
-//! `cargo bench --bench quality` prints one row for each workload, method and class of shading points; `-- --quick`
+//! `cargo bench -p fanlight-benches --bench quality` prints one row for each workload, method and class of shading points; `-- --quick`
 //! takes less than a minute. `-- --stratification`, `--splitting`, `--lobes`, `--terms` and `--room` run a study instead, and
 //! `--everything` all of them after the table.
 //!
@@ -32,7 +32,10 @@ use report::Row;
 type Failure = Box<dyn core::error::Error>;
 
 fn main() -> ExitCode {
-    match Args::parse().map_err(Failure::from).and_then(|args| run(&args)) {
+    // Paths on the command line are relative to the root of the repository, wherever cargo starts a benchmark.
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+    let args = std::env::set_current_dir(root).map_err(|error| error.to_string()).and_then(|()| Args::parse());
+    match args.map_err(Failure::from).and_then(|args| run(&args)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{error}");

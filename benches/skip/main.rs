@@ -1,6 +1,6 @@
 //! What is saved where a scene does not need something: pairs of scenes, one with and one without it.
 //!
-//! `cargo bench --bench skip` prints a table. Times are medians of runs that take turns, so that both see the same
+//! `cargo bench -p fanlight-benches --bench skip` prints a table. Times are medians of runs that take turns, so that both see the same
 //! machine; bytes are those that the samplers report.
 
 #[path = "../instruction_set.rs"]

@@ -10,7 +10,7 @@ use crate::render::{Budget, Error};
 pub(crate) const HELP: &str = "\
 Renders scenes without and with fanlight in the same time, and prints their errors against a long reference.
 
-Usage: cargo run --release --example gallery -- NAME | all | FILE.gltf | FILE.glb | export DIR [OPTIONS]
+Usage: cargo run --release -p fanlight-gallery -- NAME | all | FILE.gltf | FILE.glb | export DIR [OPTIONS]
 
   NAME             room, car, lantern, letters, pinhole, facade, nested, neon or fog
   all              all of them, and a contact sheet

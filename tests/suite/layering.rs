@@ -29,7 +29,7 @@ fn module_of(file: &Path) -> Option<String> {
 }
 
 /// The source with every comment, string and character literal blanked, so that places stay what they are.
-fn without_comments(source: &str) -> Vec<char> {
+pub(crate) fn without_comments(source: &str) -> Vec<char> {
     let mut chars: Vec<char> = source.chars().collect();
     let mut i = 0;
     let blank = |chars: &mut Vec<char>, from: usize, to: usize| {
@@ -62,7 +62,7 @@ fn without_comments(source: &str) -> Vec<char> {
     chars
 }
 
-fn is_word(c: char) -> bool {
+pub(crate) fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
@@ -165,7 +165,7 @@ fn violations(file: &Path, source: &str) -> Vec<String> {
 }
 
 /// All source files but unit tests, which may look at everything.
-fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+pub(crate) fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("the folder can be read") {
         let path = entry.expect("the entry can be read").path();
         if path.file_stem().is_some_and(|stem| stem == "tests") {

@@ -2,6 +2,8 @@
 //!
 //! `cargo test NAME` runs a module or a test: `cargo test golden`, `cargo test layering`. Sizes are in [`common::tier`].
 
+#![expect(clippy::incompatible_msrv, reason = "the crate alone is built with its oldest compiler")]
+
 // Shared with the fuzz targets.
 #[path = "../fuzz/checks/mod.rs"]
 mod checks;
@@ -10,6 +12,7 @@ mod common;
 mod agreement;
 mod build;
 mod chi_square;
+mod docs;
 mod double_check;
 mod emission;
 mod errors;
