@@ -81,7 +81,12 @@ impl Args {
         }
         args.seeds = seeds.unwrap_or(if args.quick { 4 } else { 8 });
         args.seconds = seconds.unwrap_or(if args.quick { 0.1 } else { 3.0 });
-        if args.seeds == 0 || args.threads == 0 || !(args.seconds > 0.0) || args.bounces.contains(&0) {
+        if args.seeds == 0
+            || args.threads == 0
+            || args.seconds.is_nan()
+            || args.seconds <= 0.0
+            || args.bounces.contains(&0)
+        {
             return Err(format!("all numbers have to be positive\n\n{USAGE}").into());
         }
         Ok(Some(args))

@@ -38,9 +38,9 @@ impl SphericalRectangle {
         let (x1, y1) = (x0 + width, y0 + height);
         // Normals of the planes through the four edges.
         let normal = |a: f64, b: f64| DVec3::new(0.0, -z0, a).normalize() * b;
-        let (bottom, top) = (normal(y0, 1.0), normal(y1, -1.0));
+        let (bottom, top) = (normal(y0, -1.0), normal(y1, 1.0));
         let side = |a: f64, b: f64| DVec3::new(-z0, 0.0, a).normalize() * b;
-        let (right, left) = (side(x1, -1.0), side(x0, 1.0));
+        let (right, left) = (side(x1, 1.0), side(x0, -1.0));
         let angle = |a: DVec3, b: DVec3| (-a.dot(b)).clamp(-1.0, 1.0).acos();
         let g = [angle(bottom, right), angle(right, top), angle(top, left), angle(left, bottom)];
         let k = TAU - g[2] - g[3];
