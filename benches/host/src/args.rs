@@ -1,0 +1,94 @@
+//! Command line.
+
+use std::env;
+use std::path::{Path, PathBuf};
+
+use lexopt::prelude::*;
+
+use crate::Error;
+
+const USAGE: &str = "\
+cargo bench -p fanlight-host --bench host -- [OPTIONS]
+
+  --scene NAME    only this scene; may be repeated
+  --bounces N     only this number of surfaces that light touches (1 and 5 without it); may be repeated
+  --seeds N       images of each method (8; 4 with --quick)
+  --seconds S     CPU time of each image (3; 0.1 with --quick)
+  --threads N     threads that compute references (all cores); the measurement runs on one
+  --quick         a few scenes that need no data, in less than two minutes
+  --validate      compares with the references of another renderer instead
+  --data DIR      environments and references (FANLIGHT_DATA, or ../shared/data next to the repository)
+  --json FILE     writes the figures
+  --picture DIR   writes one image of each method";
+
+/// What the user asks for.
+#[derive(Clone, Debug)]
+pub(crate) struct Args {
+    pub(crate) scenes: Vec<String>,
+    pub(crate) bounces: Vec<u32>,
+    pub(crate) seeds: u32,
+    /// CPU time of an image.
+    pub(crate) seconds: f64,
+    pub(crate) threads: usize,
+    pub(crate) quick: bool,
+    pub(crate) validate: bool,
+    pub(crate) data: PathBuf,
+    pub(crate) json: Option<PathBuf>,
+    pub(crate) picture: Option<PathBuf>,
+}
+
+impl Args {
+    /// Reads the command line. `None` if only help is asked for.
+    pub(crate) fn parse() -> Result<Option<Self>, Error> {
+        let (mut seeds, mut seconds) = (None, None);
+        let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let mut args = Self {
+            scenes: Vec::new(),
+            bounces: Vec::new(),
+            seeds: 0,
+            seconds: 0.0,
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            quick: false,
+            validate: false,
+            data: env::var_os("FANLIGHT_DATA").map_or_else(|| repository.join("../shared/data"), PathBuf::from),
+            json: None,
+            picture: None,
+        };
+        let mut parser = lexopt::Parser::from_env();
+        while let Some(word) = parser.next()? {
+            match word {
+                Long("scene") => args.scenes.push(parser.value()?.string()?),
+                Long("bounces") => args.bounces.push(parser.value()?.parse()?),
+                Long("seeds") => seeds = Some(parser.value()?.parse()?),
+                Long("seconds") => seconds = Some(parser.value()?.parse()?),
+                Long("threads") => args.threads = parser.value()?.parse()?,
+                Long("quick") => args.quick = true,
+                Long("validate") => args.validate = true,
+                Long("data") => args.data = parser.value()?.into(),
+                Long("json") => args.json = Some(parser.value()?.into()),
+                Long("picture") => args.picture = Some(parser.value()?.into()),
+                // Cargo adds it.
+                Long("bench") => {}
+                Short('h') | Long("help") => {
+                    println!("{USAGE}");
+                    return Ok(None);
+                }
+                _ => return Err(format!("{}\n\n{USAGE}", word.unexpected()).into()),
+            }
+        }
+        if args.bounces.is_empty() {
+            args.bounces = vec![1, 5];
+        }
+        args.seeds = seeds.unwrap_or(if args.quick { 4 } else { 8 });
+        args.seconds = seconds.unwrap_or(if args.quick { 0.1 } else { 3.0 });
+        if args.seeds == 0
+            || args.threads == 0
+            || args.seconds.is_nan()
+            || args.seconds <= 0.0
+            || args.bounces.contains(&0)
+        {
+            return Err(format!("all numbers have to be positive\n\n{USAGE}").into());
+        }
+        Ok(Some(args))
+    }
+}

@@ -1,0 +1,126 @@
+//! Every call of `fanlight` is in this file: emitters and sky as the crate's documentation recommends.
+//!
+//! One sampler holds the emitters and the portals. A sample on an emitter stands for that point alone; a sample on a portal
+//! stands for the sky along the direction, through whatever portals the ray crosses. A sky that no portal leads to is sampled
+//! as a second technique.
+
+use fanlight::{
+    Environment, Filter, Hit, LightSampler, Mesh, PointSampler, ShadingPoint, Texture, TriangleId, Weight, Wrap,
+};
+use glam::Vec3;
+
+use super::{Lighting, LightsHere, Proposal, Target};
+use crate::Error;
+use crate::bsdf::Vertex;
+use crate::random::Pcg32;
+use crate::scene::Radiance;
+use crate::world::{EmitterPoint, World};
+
+/// The lights of a scene.
+pub(super) struct Fanlight {
+    lights: LightSampler,
+    /// What the sampler calls each triangle of the emitters.
+    ids: Vec<TriangleId>,
+    /// The number of the first triangle of each emitter among all of them.
+    starts: Vec<u32>,
+    /// Whether there are emitters or portals.
+    has_lights: bool,
+    /// Whether the sky is seen, but not through portals.
+    open_sky: bool,
+}
+
+impl Fanlight {
+    /// Hands the lights of a scene over.
+    pub(super) fn new(world: &World) -> Result<Self, Error> {
+        let scene = &world.scene;
+        let mut builder = LightSampler::builder();
+        if let Some(sky) = &scene.sky {
+            let environment =
+                Environment::from_lat_long(sky.image().width, sky.image().height, &sky.luminance(), Filter::Bilinear)?;
+            builder.environment(environment.with_rotation(sky.rotation())?);
+        }
+        for emitter in &scene.emitters {
+            let mesh = Mesh::emitter(&emitter.mesh.positions, &emitter.mesh.indices);
+            let weight = match &emitter.radiance {
+                Radiance::Constant(radiance) => Weight::Constant(*radiance),
+                Radiance::Textured(texture) => {
+                    let image = Texture::new(texture.size, texture.size, &texture.texels)?;
+                    Weight::Texture(builder.add_texture(image.wrap(Wrap::Clamp, Wrap::Clamp)))
+                }
+            };
+            builder.add_mesh(&mesh.uvs(&emitter.mesh.uvs).weight(weight))?;
+        }
+        for portal in &scene.portals {
+            builder.add_mesh(&Mesh::portal(&portal.mesh.positions, &portal.mesh.indices))?;
+        }
+        let ids = world.emitters.iter().map(|e| TriangleId { mesh: e.mesh, triangle: e.triangle });
+        let starts = scene.emitters.iter().scan(0, |next, emitter| {
+            let first = *next;
+            *next += emitter.mesh.indices.len() as u32;
+            Some(first)
+        });
+        Ok(Self {
+            lights: builder.build()?,
+            ids: ids.collect(),
+            starts: starts.collect(),
+            has_lights: !scene.emitters.is_empty() || !scene.portals.is_empty(),
+            open_sky: scene.sky.is_some() && scene.portals.is_empty(),
+        })
+    }
+}
+
+/// The lights as seen from a vertex.
+pub(super) struct Here<'a> {
+    fanlight: &'a Fanlight,
+    lights: PointSampler<'a>,
+}
+
+impl Lighting for Fanlight {
+    type Here<'a> = Here<'a>;
+
+    #[inline]
+    fn at(&self, vertex: &Vertex) -> Here<'_> {
+        let point = ShadingPoint::surface(vertex.position, vertex.normal);
+        Here { fanlight: self, lights: self.lights.at(&point) }
+    }
+}
+
+impl LightsHere for Here<'_> {
+    #[inline]
+    fn propose(&self, random: &mut Pcg32, mut visit: impl FnMut(Proposal)) {
+        if self.fanlight.open_sky
+            && let Some(sample) = self.fanlight.lights.environment().sample(random.uniform2())
+        {
+            visit(Proposal { direction: sample.direction, target: Target::Sky, pdf: sample.pdf });
+        }
+        if self.fanlight.has_lights
+            && let Some(sample) = self.lights.sample(random.uniform3())
+        {
+            let TriangleId { mesh, triangle } = sample.hit.triangle;
+            let (target, pdf) = match self.fanlight.starts.get(mesh as usize) {
+                Some(first) => {
+                    let barycentrics = sample.hit.barycentrics;
+                    let point = EmitterPoint { triangle: first + triangle, barycentrics, position: sample.position };
+                    (Target::Emitter(point), sample.pdf)
+                }
+                None => (Target::Sky, self.lights.pdf_sample_direction(&sample)),
+            };
+            visit(Proposal { direction: sample.direction, target, pdf });
+        }
+    }
+
+    #[inline]
+    fn sky_pdf(&self, direction: Vec3) -> f32 {
+        if self.fanlight.open_sky {
+            self.fanlight.lights.environment().pdf(direction)
+        } else {
+            self.lights.pdf_direction(direction)
+        }
+    }
+
+    #[inline]
+    fn emitter_pdf(&self, point: &EmitterPoint, _: Vec3) -> f32 {
+        let triangle = self.fanlight.ids[point.triangle as usize];
+        self.lights.pdf(&Hit { triangle, barycentrics: point.barycentrics })
+    }
+}
