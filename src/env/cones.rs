@@ -7,7 +7,8 @@ use super::view::{EnvironmentView, texel_at};
 use crate::warp::equal_area::sphere_to_square;
 use glam::Vec3;
 
-/// Number of balls from which all lanes are computed in one loop. *Measured* by the bench `instructions`.
+/// Number of balls from which all lanes are computed in one loop. *Measured* by the bench `instructions`: with 2
+/// a sample of the window costs 11 % more.
 ///
 /// Larger: more balls are looked up one by one. Smaller: vectors whose lanes are mostly unused.
 const FEWEST_IN_LOOP: u32 = 4;

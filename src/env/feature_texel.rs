@@ -92,6 +92,6 @@ mod tests {
                 }
             }
         }
-        assert!(worst < 1.0 && worst >= 1.0 / BETWEEN_PLACES * 0.99, "{worst}");
+        assert!((0.99 / BETWEEN_PLACES..1.0).contains(&worst), "{worst}");
     }
 }
