@@ -114,9 +114,9 @@ impl BrightFeatures {
             if bright.is_empty() || flux - mean(cap) < limits.flux_share * flux {
                 break;
             }
-            if bright.len() as f64 <= limits.image_share * image.len() as f64
-                && let Some(features) = Self::gather(depth, image, &bright, cap as f32, limits)
-            {
+            let few = bright.len() as f64 <= limits.image_share * image.len() as f64;
+            let found = if few { Self::gather(depth, image, &bright, cap as f32, limits) } else { None };
+            if let Some(features) = found {
                 return features;
             }
             cap *= 2.0;
@@ -208,9 +208,8 @@ fn cluster(depth: u32, bright: &[u32], taken: &mut [bool], start: usize) -> Vec<
         let (x, y) = ((texel & ((1 << depth) - 1)) as i32, (texel >> depth) as i32);
         for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
             let (i, j) = wrap_texel_log2(x + dx, y + dy, depth);
-            if let Ok(next) = bright.binary_search(&((j << depth) | i))
-                && !taken[next]
-            {
+            let neighbor = bright.binary_search(&((j << depth) | i));
+            if let Some(next) = neighbor.ok().filter(|next| !taken[*next]) {
                 taken[next] = true;
                 open.push(next);
             }
