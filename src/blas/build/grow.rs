@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::blas::barycentric::{ARITY, LatticeCell};
 use crate::blas::build::touched::TexelRange;
 use crate::blas::node::{BLOCK_CELLS, CellBlock, LEAF, Root, append, end, storable};
-use crate::error::{Error, Kind};
+use crate::error::{Error, ErrorKind};
 use crate::parallel;
 
 /// From this number of cells on, they are measured side by side.
@@ -59,7 +59,7 @@ impl GrownTree {
         }
         let count = end(pool, self.divided.len() / ARITY);
         if count >= LEAF as usize {
-            return Err(Error(Kind::TooMany { what: "BLAS nodes", count, limit: LEAF as usize }));
+            return Err(Error(ErrorKind::TooMany { what: "BLAS nodes", count, limit: LEAF as usize }));
         }
         let bytes = self.averages.len().div_ceil(BLOCK_CELLS) * size_of::<CellBlock>();
         Ok((Root { average: self.average, node: append(pool, &self.averages, &self.divided) }, bytes as f64))
