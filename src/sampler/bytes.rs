@@ -233,9 +233,9 @@ impl<'a> Reader<'a> {
         if length == 0 {
             return Ok(&[]);
         }
-        let address = bytes.as_ptr() as usize;
-        if !address.is_multiple_of(ALIGNMENT) {
-            return Err(Error::bytes("alignment", at, address % ALIGNMENT, 0u64));
+        let misalignment = bytes.as_ptr() as usize % ALIGNMENT;
+        if misalignment != 0 {
+            return Err(Error::bytes("alignment", at, misalignment, 0u64));
         }
         bytemuck::try_cast_slice(bytes).map_err(|_| Error::bytes(what, at, length, size_of::<T>()))
     }
