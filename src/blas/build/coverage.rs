@@ -35,7 +35,7 @@ const LINE_AREA: f64 = 1e-9;
 
 /// A footprint, or the part of one in a square of texels. A triangle cut by four lines has at most seven vertices;
 /// rounding could add one at each cut.
-type Polygon = geometry::Polygon<f64, 12>;
+type FootprintPolygon = geometry::Polygon<f64, 12>;
 
 /// The average over a footprint in which lookups lie in `range`, from 0 to
 /// [`MAX_AVERAGE`](crate::blas::node::MAX_AVERAGE).
@@ -74,8 +74,8 @@ fn texels(footprint: &TexelFootprint) -> f64 {
 }
 
 /// Splits the polygon by unit squares and visits each piece with its square's corner.
-fn squares(polygon: Polygon, mut each: impl FnMut([f64; 2], &Polygon)) {
-    let span = |polygon: &Polygon, k: usize| {
+fn squares(polygon: FootprintPolygon, mut each: impl FnMut([f64; 2], &FootprintPolygon)) {
+    let span = |polygon: &FootprintPolygon, k: usize| {
         let (lo, hi) = extent(polygon, k);
         // An empty polygon spans nothing.
         if lo <= hi { (floor64(lo) as i64, floor64(hi) as i64) } else { (0, -1) }
@@ -91,13 +91,13 @@ fn squares(polygon: Polygon, mut each: impl FnMut([f64; 2], &Polygon)) {
 }
 
 /// Ends of a polygon along an axis.
-fn extent(polygon: &Polygon, axis: usize) -> (f64, f64) {
+fn extent(polygon: &FootprintPolygon, axis: usize) -> (f64, f64) {
     let ends = (f64::INFINITY, f64::NEG_INFINITY);
     polygon.vertices().iter().fold(ends, |(lo, hi), v| (v[axis].min(lo), v[axis].max(hi)))
 }
 
 /// The part of a polygon between two parallels: `lo <= coordinate <= hi` along an axis.
-fn strip(polygon: &Polygon, axis: usize, lo: f64, hi: f64) -> Polygon {
+fn strip(polygon: &FootprintPolygon, axis: usize, lo: f64, hi: f64) -> FootprintPolygon {
     let (min, max) = extent(polygon, axis);
     let mut out = *polygon;
     if min < lo {
@@ -110,7 +110,7 @@ fn strip(polygon: &Polygon, axis: usize, lo: f64, hi: f64) -> Polygon {
 }
 
 /// Area, not negative.
-fn area(polygon: &Polygon) -> f64 {
+fn area(polygon: &FootprintPolygon) -> f64 {
     polygon.fan().map(|(_, double)| 0.5 * double.abs()).sum()
 }
 
@@ -118,7 +118,7 @@ fn area(polygon: &Polygon) -> f64 {
 /// a polygon inside of it.
 ///
 /// The weights are quadratic, so that the rule of the three edge midpoints is exact on each triangle of a fan.
-fn bilinear_weights(polygon: &Polygon, corner: [f64; 2]) -> [f64; 4] {
+fn bilinear_weights(polygon: &FootprintPolygon, corner: [f64; 2]) -> [f64; 4] {
     let mut weights = [0.0; 4];
     for ([a, b, c], double) in polygon.fan() {
         let area = 0.5 * double.abs();
@@ -140,7 +140,7 @@ fn bilinear_weights(polygon: &Polygon, corner: [f64; 2]) -> [f64; 4] {
 fn nearest(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
     let texture = prepared.texture();
     let (mut sum, mut total) = (0.0, 0.0);
-    squares(Polygon::new(footprint.corners), |corner, piece| {
+    squares(FootprintPolygon::new(footprint.corners), |corner, piece| {
         let covered = area(piece);
         let [x, y] = core::array::from_fn(|k| footprint.origin[k] + corner[k] as i64);
         sum += covered * f64::from(texture.fetch(x, y));
@@ -155,7 +155,7 @@ fn bilinear(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     // Patches have their corners at texel centers.
     let shifted = footprint.corners.map(|[x, y]| [x - 0.5, y - 0.5]);
-    squares(Polygon::new(shifted), |corner, piece| {
+    squares(FootprintPolygon::new(shifted), |corner, piece| {
         let weights = bilinear_weights(piece, corner);
         let [x, y]: [i64; 2] = core::array::from_fn(|k| footprint.origin[k] + corner[k] as i64);
         let texels = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];

@@ -5,7 +5,7 @@ use core::convert::Infallible;
 
 use glam::Vec2;
 
-use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_DEPTH};
+use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
 use crate::blas::build::coverage::average;
 use crate::blas::build::footprint::{UvTriangle, check_uv};
 use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
@@ -107,7 +107,7 @@ pub(crate) fn build(
     let fine = levels(&chart);
     let [sharp, blurred] = EXTRA_HALVINGS;
     let extra = if prepared.texture().filtering() == Filter::Nearest { sharp } else { blurred };
-    let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_DEPTH / LEVEL_HALVINGS);
+    let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_HALVINGS / LEVEL_HALVINGS);
     debug_assert!(LATTICE >> (deepest * LEVEL_HALVINGS) >= 16);
     let source = ImageOnTriangle { prepared, chart: &chart };
     let Ok(tree) = grow(&source, range, &GrowthLimits { nodes, fine, deepest, variance: IMAGE_VARIANCE });
@@ -147,7 +147,7 @@ fn levels(chart: &UvTriangle) -> u32 {
     let (double_area, longest) = chart.extent();
     let mut levels = 0;
     let mut scale = 1.0;
-    while (levels + 1) * halvings <= MAX_DEPTH
+    while (levels + 1) * halvings <= MAX_HALVINGS
         && (0.5 * double_area * scale > FINE_AREA || longest * scale > FINE_LENGTH * FINE_LENGTH)
     {
         levels += 1;
