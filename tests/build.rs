@@ -123,6 +123,6 @@ fn a_build_can_be_cancelled() {
         // Other threads may be on their way to report.
         assert!(called.into_inner() < calls + 64);
     }
-    let nothing = LightSamplerBuilder::<8, 4>::new().build_with(|_| ControlFlow::Break(()));
+    let nothing = LightSamplerBuilder::<8>::new().build_with(|_| ControlFlow::Break(()));
     assert!(nothing.is_err_and(|error| error.is_cancelled()));
 }

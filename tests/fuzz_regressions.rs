@@ -76,7 +76,7 @@ fn triangles_and_their_leaves_agree() {
     }
     let bytes = builder.build().expect("two triangles").to_bytes();
     let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
-    let load = |words: &[u32]| LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(words)).map(drop);
+    let load = |words: &[u32]| LightSamplerView::<16>::from_bytes(bytemuck::cast_slice(words)).map(drop);
     load(&words).expect("its own bytes");
     let starts = words.windows(3).rposition(|window| *window == [0, 1, 2]).expect("the starts of the meshes");
     let mut swapped = words.clone();

@@ -159,13 +159,13 @@ fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> (f64, 
 fn what_can_be_drawn_can_be_drawn_in_the_changed_scene() {
     let counts = parallel::map(SCENES, |number| {
         let (scene, mut pcg) = scene(number, [1, 4, 30, 300][number % 4]);
-        let lights = scene.build::<16, 4>();
+        let lights = scene.build::<16>();
         let mut counted = 0;
         for (name, change) in CHANGES {
             for kind in 0..3 {
                 let x = random_point(&mut pcg, kind);
                 let changed = change(&scene, &x, &mut pcg);
-                let other = changed.scene.build::<16, 4>();
+                let other = changed.scene.build::<16>();
                 for _ in 0..200 {
                     let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
                     let (value, cosine) = contribution(&scene, &x, &sample);
@@ -193,13 +193,13 @@ fn the_density_of_one_triangle_moves_with_it() {
         if scene.illumination == Illumination::Boundary {
             scene.illumination = Illumination::default();
         }
-        let lights = scene.build::<16, 4>();
+        let lights = scene.build::<16>();
         let mut ratios = Vec::new();
         for (_, change) in [CHANGES[1], CHANGES[2]] {
             for kind in 0..3 {
                 let x = random_point(&mut pcg, kind);
                 let changed = change(&scene, &x, &mut pcg);
-                let other = changed.scene.build::<16, 4>();
+                let other = changed.scene.build::<16>();
                 for _ in 0..500 {
                     let Some(sample) = lights.sample(&x, pcg.cube()) else { continue };
                     let (value, cosine) = contribution(&scene, &x, &sample);
@@ -218,7 +218,7 @@ fn the_density_of_one_triangle_moves_with_it() {
     assert!(equal as f64 > 0.99 * ratios.len() as f64, "{equal} of {}", ratios.len());
 }
 
-fn estimate(scene: &Scene, lights: &LightSampler<16, 4>, x: &ShadingPoint, pcg: &mut Pcg32) -> Mean {
+fn estimate(scene: &Scene, lights: &LightSampler<16>, x: &ShadingPoint, pcg: &mut Pcg32) -> Mean {
     let mut mean = Mean::default();
     for _ in 0..20_000 {
         let sample = lights.sample(x, pcg.cube());
@@ -262,7 +262,7 @@ fn the_winding_says_which_side_is_lit() {
         let mut both = scene.clone();
         both.meshes[0].two_sided = true;
         let x = ShadingPoint::volume(2.0 * Vec3::from(pcg.cube()) - 0.5);
-        let [one, other, both] = [scene, other, both].map(|scene| scene.build::<16, 4>());
+        let [one, other, both] = [scene, other, both].map(|scene| scene.build::<16>());
         for _ in 0..20 {
             let Some(sample) = both.sample(&x, pcg.cube()) else { continue };
             let [b1, b2] = sample.hit.barycentrics;

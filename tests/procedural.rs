@@ -68,7 +68,7 @@ fn light() -> Scene {
     }
 }
 
-fn sampler<const N: usize, const M: usize>(scene: &Scene, function: &dyn Procedural) -> LightSampler<N, M> {
+fn sampler<const N: usize>(scene: &Scene, function: &dyn Procedural) -> LightSampler<N> {
     let mut builder = LightSamplerBuilder::new();
     let weight = Weight::Texture(builder.add_procedural(function));
     let LightMesh { positions, indices, uvs, .. } = &scene.meshes[0];
@@ -124,9 +124,9 @@ fn check_density(count: usize, case: impl Fn(usize) -> usize + Sync) {
     let found = parallel::map(count, |i| {
         let (function, tolerance) = CASES[case(i) / 3];
         let lights: Box<dyn Lights> = match case(i) % 3 {
-            0 => Box::new(sampler::<16, 4>(&scene, function)),
-            1 => Box::new(sampler::<8, 16>(&scene, function)),
-            _ => Box::new(sampler::<8, 64>(&scene, function)),
+            0 => Box::new(sampler::<16>(&scene, function)),
+            1 => Box::new(sampler::<8>(&scene, function)),
+            _ => Box::new(sampler::<4>(&scene, function)),
         };
         (examine(&*lights, &scene, &points()[case(i) % 3], 6, false), tolerance)
     });
@@ -153,14 +153,14 @@ fn samples_of_any_function_follow_the_density() {
 #[ignore = "release tier; cargo test --release --test procedural -- --ignored"]
 fn a_density_that_is_off_is_found() {
     let scene = light();
-    assert!(examine(&sampler::<16, 4>(&scene, WAVES), &scene, &points()[0], 6, true).0 < 1e-9);
+    assert!(examine(&sampler::<16>(&scene, WAVES), &scene, &points()[0], 6, true).0 < 1e-9);
 }
 
 #[test]
 fn wherever_the_function_is_bright_it_can_be_sampled() {
     let scene = light();
     for function in [DOTS, WAVES, LOOSE] {
-        let lights = sampler::<16, 4>(&scene, function);
+        let lights = sampler::<16>(&scene, function);
         let mut pcg = Pcg32::new(3, 62);
         let mut dark = 0;
         for _ in 0..20_000 {
@@ -216,7 +216,7 @@ fn a_function_is_as_good_a_guide_as_an_image_of_it() {
     let scene = light();
     for (name, function, is_tight) in [("dots", DOTS, true), ("waves", WAVES, true), ("loose", LOOSE, false)] {
         let [image, unaware] = [512, 0].map(|size| by_image(&scene, function, size));
-        let lights = sampler::<16, 4>(&scene, function);
+        let lights = sampler::<16>(&scene, function);
         println!("{name}: {:?} and {:?} bytes", image.as_view().bytes()[2], lights.as_view().bytes()[2]);
         for x in points() {
             let value = |p: Vec3| function.weight(COPIES * 0.5 * vec2(p.x + 1.0, p.y + 1.0));
@@ -245,7 +245,7 @@ fn cells(count: u32, scale: f32, function: &dyn Procedural) -> usize {
     let mut bytes = lights.to_bytes();
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     let words = common::lights::aligned(&bytes);
-    LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+    LightSamplerView::<16>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
     lights.as_view().bytes()[2]
 }
 

@@ -43,7 +43,7 @@ fn changed(scene: &Scene, pcg: &mut Pcg32) -> (Scene, Vec<f32>) {
     (scene, scales)
 }
 
-fn refit<const N: usize, const M: usize>(lights: &mut LightSampler<N, M>, scene: &Scene, scales: &[f32]) {
+fn refit<const N: usize>(lights: &mut LightSampler<N>, scene: &Scene, scales: &[f32]) {
     let mut updates = Vec::new();
     for (number, mesh) in (0..).zip(&scene.meshes) {
         let update = MeshUpdate::new(number).moved(&mesh.positions, &mesh.indices);
@@ -61,7 +61,7 @@ fn samples<const N: usize>(lights: &LightSampler<N>, count: usize) -> Vec<Option
 fn without_a_change_every_bit_stays() {
     for number in 0..SCENES {
         let (scene, _) = scene(number, false);
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build::<16>();
         let before = lights.to_bytes();
         lights.refit(&[]).expect("nothing is valid");
         refit(&mut lights, &scene, &[]);
@@ -74,7 +74,7 @@ fn without_a_change_every_bit_stays() {
 fn changes_can_be_taken_back() {
     for number in 0..SCENES {
         let (scene, mut pcg) = scene(number, false);
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build::<16>();
         let before = samples(&lights, 2000);
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
@@ -88,7 +88,7 @@ fn changes_can_be_taken_back() {
 fn the_density_is_that_of_the_samples() {
     for number in 0..SCENES {
         let (scene, mut pcg) = scene(number, false);
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build::<16>();
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
         for i in 0..3000 {
@@ -110,7 +110,7 @@ fn the_density_is_that_of_the_samples() {
 fn the_density_integrates_to_one() {
     let found = parallel::map(SCENES, |number| {
         let (scene, mut pcg) = scene(number, true);
-        let mut lights = scene.build::<4, 4>();
+        let mut lights = scene.build::<4>();
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
         let x = random_point(&mut pcg, 2);
@@ -150,10 +150,10 @@ fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> f64 {
 fn estimates_agree_with_the_integral_and_with_a_new_build() {
     let found = parallel::map(16, |number| {
         let (scene, mut pcg) = scene(4 * (number % 4) + 1 + number / 4 % 2, false);
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build::<16>();
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
-        let fresh = other.build::<16, 4>();
+        let fresh = other.build::<16>();
         let x = (0..100).map(|i| random_point(&mut pcg, i)).find(|x| lights.sample(x, [0.5; 3]).is_some());
         let x = x.expect("some point is lit");
         let sent = |m, t, b, direction| oracle::sent(&other, m, t, b, direction);
@@ -195,7 +195,7 @@ fn a_mesh_that_is_off_is_never_sampled() {
         let mut scene = squares();
         scene.meshes.truncate(count);
         scene.meshes.iter_mut().for_each(|mesh| mesh.indices.truncate(if count == 1 { 1 } else { 2 }));
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build::<16>();
         let x = ShadingPoint::surface(Vec3::new(0.1, 0.0, 0.0), Vec3::Z);
         let sum = |lights: &LightSampler| -> f32 { scene.triangles().map(|t| lights.pmf(&x, id(t))).sum() };
         assert!((sum(&lights) - 1.0).abs() < 1e-5);
@@ -261,7 +261,7 @@ fn suns_are_seen_through_the_portals_that_are_on() {
 #[test]
 fn triangles_may_lose_their_area_and_get_it_back() {
     let scene = squares();
-    let mut lights = scene.build::<4, 4>();
+    let mut lights = scene.build::<4>();
     let x = ShadingPoint::surface(Vec3::new(0.1, 0.0, 0.0), Vec3::Z);
     let before = lights.pmf(&x, id_of(1, 1));
     let mut flat = scene.clone();
@@ -291,7 +291,7 @@ fn bad_changes_are_refused_and_change_nothing() {
     // From here on the second triangle of the last mesh has no area.
     scene.meshes[2].indices[1] = [0, 0, 3];
     scene.meshes[2].paint = Paint::Constant(1e20);
-    let mut lights = scene.build::<16, 4>();
+    let mut lights = scene.build::<16>();
     let good = MeshUpdate::new(0).scaled(3.0);
     let refuse =
         |lights: &mut LightSampler, bad: MeshUpdate<'_>, parts: &[&str]| assert_refused(lights, &[good, bad], parts);
@@ -318,7 +318,7 @@ fn bad_changes_are_refused_and_change_nothing() {
 fn decay_tells_what_a_motion_does_to_the_tree() {
     let mut pcg = Pcg32::new(12, 33);
     let scene = Scene::new("soup", vec![LightMesh::soup(&mut pcg, 2000, 0.03)]);
-    let mut lights = scene.build::<16, 4>();
+    let mut lights = scene.build::<16>();
     let mut decay = |change: &mut dyn FnMut(usize, Vec3) -> Vec3| {
         let mut moved = scene.clone();
         moved.meshes[0].positions.iter_mut().enumerate().for_each(|(i, p)| *p = change(i / 3, *p));
@@ -359,14 +359,14 @@ fn decay_goes_with_noise() {
     let mut pcg = Pcg32::new(14, 33);
     let scene = Scene::new("soup", vec![LightMesh::soup(&mut pcg, 10_000, 0.014)]);
     let offsets: Vec<Vec3> = (0..10_000).map(|_| pcg.direction()).collect();
-    let mut lights = scene.build::<16, 4>();
+    let mut lights = scene.build::<16>();
     let mut ratios = Vec::new();
     for distance in [0.02, 0.08, 0.16, 0.3] {
         let mut moved = scene.clone();
         let positions = moved.meshes[0].positions.iter_mut().enumerate();
         positions.for_each(|(i, p)| *p += distance * offsets[i / 3]);
         refit(&mut lights, &moved, &[]);
-        let ratio = noise(&lights) / noise(&moved.build::<16, 4>());
+        let ratio = noise(&lights) / noise(&moved.build::<16>());
         println!("moved by {distance}: decay {:.2}, variance {ratio:.2} times that of a new build", lights.decay());
         ratios.push((lights.decay(), ratio));
     }
@@ -378,11 +378,11 @@ fn decay_goes_with_noise() {
 #[test]
 fn bytes_hold_what_has_changed() {
     let (scene, mut pcg) = scene(6, false);
-    let mut lights = scene.build::<16, 4>();
+    let mut lights = scene.build::<16>();
     let (other, scales) = changed(&scene, &mut pcg);
     refit(&mut lights, &other, &scales);
     let words = common::lights::aligned(&lights.to_bytes());
-    let view = fanlight::LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes load");
+    let view = fanlight::LightSamplerView::<16>::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes load");
     for i in 0..2000 {
         let (x, u) = (random_point(&mut pcg, i), pcg.cube());
         assert_eq!(view.sample(&x, u), lights.sample(&x, u));

@@ -191,7 +191,7 @@ fn at() {
 
 fn build() {
     let scene = scenes::scene("cloud-10000");
-    let mut builder = Some(LightSamplerBuilder::<16, 4>::new());
+    let mut builder = Some(LightSamplerBuilder::<16>::new());
     builder.iter_mut().for_each(|builder| add(builder, &scene));
     measured(|_| {
         if let Some(builder) = builder.take() {

@@ -1,10 +1,10 @@
-//! Barycentric coordinates as integers, and the numbering of a triangle's `M` cells.
+//! Barycentric coordinates as integers, and the numbering of a node's cells.
 //!
 //! A point is three integers `(i0, i1, i2)` that sum to `2^24`, so that `b1 = i1 · 2^-24` and `b2 = i2 · 2^-24` are
 //! exact in an `f32`, and so is every step of a descent: a point is drawn in the cell that a look-up of the same
 //! point finds, at every depth, on edges and corners too.
 //!
-//! The numbering is Ogaki's: with `R = √M` and `βk = min(R - 1, ⌊(1 - bk) R⌋)`, the index is
+//! The numbering is Ogaki's: with [`ARITY`] `M`, `R = √M` and `βk = min(R - 1, ⌊(1 - bk) R⌋)`, the index is
 //! `β0² + (β1 - β2) + β0`. Rows are numbered from vertex 0; row `r` holds `2 r + 1` cells, by turns upright and
 //! inverted. An upright cell has the corners of the whole triangle in the same order; an inverted one is turned by
 //! half a circle, corner `k` lying across from the edge that would be edge `k`. In its own coordinates an inverted
@@ -18,23 +18,21 @@ pub(crate) const LATTICE_BITS: u32 = 24;
 /// The sum of a point's three coordinates: the edge length of the whole triangle in lattice units.
 pub(crate) const LATTICE: u32 = 1 << LATTICE_BITS;
 
-/// How often the whole triangle's edge may be halved. A level of arity `M` halves it `log2 √M` times.
+/// How often the whole triangle's edge may be halved. A level halves it [`LEVEL_HALVINGS`] times.
 ///
 /// The smallest cell is 16 lattice units wide and still has points strictly inside.
 pub(crate) const MAX_DEPTH: u32 = 20;
 
-/// Cells along one edge of a node of arity `M`: 2, 4 or 8.
-#[inline(always)]
-pub(crate) const fn edge_cells<const M: usize>() -> u32 {
-    const { assert!(M == 4 || M == 16 || M == 64, "the arity of a BLAS is 4, 16 or 64") };
-    (M as u32).isqrt()
-}
+/// Cells of a node.
+pub(crate) const ARITY: usize = 4;
 
-/// Halvings of an edge that one level of arity `M` stands for: 1, 2 or 3.
-#[inline(always)]
-pub(crate) const fn level_halvings<const M: usize>() -> u32 {
-    edge_cells::<M>().trailing_zeros()
-}
+/// Cells along one edge of a node.
+pub(crate) const EDGE_CELLS: u32 = (ARITY as u32).isqrt();
+
+/// Halvings of an edge that one level stands for.
+pub(crate) const LEVEL_HALVINGS: u32 = EDGE_CELLS.trailing_zeros();
+
+const _: () = assert!(EDGE_CELLS.is_power_of_two() && (EDGE_CELLS * EDGE_CELLS) as usize == ARITY);
 
 /// A point of the triangle. The coordinates sum to [`LATTICE`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,15 +64,15 @@ impl Lattice {
     }
 }
 
-/// Which of a node's `M` cells holds a point, and the point's coordinates in that cell.
+/// Which of a node's cells holds a point, and the point's coordinates in that cell.
 ///
-/// `local` sums to `size`, a power of two and a multiple of `√M`; the returned coordinates sum to `size / √M`.
+/// `local` sums to `size`, a power of two and a multiple of [`EDGE_CELLS`]; the returned coordinates sum to `size / EDGE_CELLS`.
 /// Every point has exactly one index; one strictly inside of a cell has that cell's.
 #[inline]
-pub(crate) fn child<const M: usize>(local: [u32; 3], size: u32) -> (usize, [u32; 3]) {
-    let r = edge_cells::<M>();
+pub(crate) fn child(local: [u32; 3], size: u32) -> (usize, [u32; 3]) {
+    let r = EDGE_CELLS;
     debug_assert!(size.is_power_of_two() && size >= r && local.iter().sum::<u32>() == size);
-    let shift = size.trailing_zeros() - level_halvings::<M>();
+    let shift = size.trailing_zeros() - LEVEL_HALVINGS;
     let t = 1 << shift;
     let [j0, j1, j2] = local;
     let mut a1 = j1 >> shift;
@@ -107,11 +105,11 @@ pub(crate) struct Place {
     pub(crate) inverted: bool,
 }
 
-/// The inverse of the numbering. `index` is below `M`.
+/// The inverse of the numbering. `index` is below [`ARITY`].
 #[inline]
-pub(crate) const fn place<const M: usize>(index: usize) -> Place {
-    let r = edge_cells::<M>();
-    debug_assert!(index < M);
+pub(crate) const fn place(index: usize) -> Place {
+    let r = EDGE_CELLS;
+    debug_assert!(index < ARITY);
     let index = index as u32;
     let row = index.isqrt();
     let column = index - row * row;
@@ -138,11 +136,11 @@ impl Cell {
         Self { offset: [0; 3], inverted: false, size: LATTICE }
     }
 
-    /// One of the `M` cells of this one. `index` is below `M`.
+    /// One of the cells of this one. `index` is below [`ARITY`].
     #[inline]
-    pub(crate) fn child<const M: usize>(self, index: usize) -> Self {
-        let Place { a, inverted } = place::<M>(index);
-        let size = self.size >> level_halvings::<M>();
+    pub(crate) fn child(self, index: usize) -> Self {
+        let Place { a, inverted } = place(index);
+        let size = self.size >> LEVEL_HALVINGS;
         let mut offset = self.offset;
         for (o, a) in offset.iter_mut().zip(a) {
             let step = ((a + u32::from(inverted)) * size) as i32;

@@ -5,7 +5,7 @@ use core::convert::Infallible;
 
 use glam::Vec2;
 
-use crate::blas::barycentric::{Cell, LATTICE, MAX_DEPTH, level_halvings};
+use crate::blas::barycentric::{ARITY, Cell, LATTICE, LEVEL_HALVINGS, MAX_DEPTH};
 use crate::blas::coverage::{average, storable};
 use crate::blas::footprint::{Chart, check_uv};
 use crate::blas::grow::{Limits, Source, Tree, grow};
@@ -64,11 +64,7 @@ const LEAVES_PER_COPY: f64 = 4.0;
 /// If a coordinate is not finite or beyond [`UV_LIMIT`](crate::blas::footprint::UV_LIMIT) (a caller that knows the
 /// mesh checks first, with [`check_uv`]; here the error says mesh 0), or if the pool has no more indices. The pool
 /// is then as it was.
-pub(crate) fn build<const M: usize>(
-    prepared: &mut Prepared<'_>,
-    uv: [Vec2; 3],
-    pool: &mut Vec<Block<M>>,
-) -> Result<Root, Error> {
+pub(crate) fn build(prepared: &mut Prepared<'_>, uv: [Vec2; 3], pool: &mut Vec<Block>) -> Result<Root, Error> {
     for (vertex, uv) in uv.into_iter().enumerate() {
         check_uv(0, vertex, uv)?;
     }
@@ -80,32 +76,32 @@ pub(crate) fn build<const M: usize>(
     let footprint = chart.footprint(Cell::root());
     let range = touched::range(prepared, &footprint, true);
     let memory = Memory::new(&chart, prepared);
-    let nodes = memory.nodes::<M>(&chart, prepared.texture());
+    let nodes = memory.nodes(&chart, prepared.texture());
     if range.is_constant() || nodes == 0 {
         return Ok(Root::constant(average(prepared, &footprint, range)));
     }
-    let fine = levels::<M>(&chart);
+    let fine = levels(&chart);
     let [sharp, blurred] = EXTRA_HALVINGS;
     let extra = if prepared.texture().filtering() == Filter::Nearest { sharp } else { blurred };
-    let deepest = (fine + extra / level_halvings::<M>()).min(MAX_DEPTH / level_halvings::<M>());
-    debug_assert!(LATTICE >> (deepest * level_halvings::<M>()) >= 16);
+    let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_DEPTH / LEVEL_HALVINGS);
+    debug_assert!(LATTICE >> (deepest * LEVEL_HALVINGS) >= 16);
     let source = ImageOn { prepared, chart: &chart };
-    let Ok(tree) = grow::<M, _>(&source, range, &Limits { nodes, fine, deepest, variance: VARIANCE });
+    let Ok(tree) = grow(&source, range, &Limits { nodes, fine, deepest, variance: VARIANCE });
     let (root, bytes) = store(&tree, pool)?;
     prepared.extra -= (bytes - memory.own).max(0.0).min(prepared.extra);
     Ok(root)
 }
 
 /// Adds a tree to the pool. Second, the bytes that it takes.
-pub(super) fn store<const M: usize>(tree: &Tree, pool: &mut Vec<Block<M>>) -> Result<(Root, f64), Error> {
+pub(super) fn store(tree: &Tree, pool: &mut Vec<Block>) -> Result<(Root, f64), Error> {
     if tree.divided.is_empty() || tree.average == 0.0 {
         return Ok((Root::constant(tree.average), 0.0));
     }
-    let count = end(pool, tree.divided.len() / M);
+    let count = end(pool, tree.divided.len() / ARITY);
     if count >= LEAF as usize {
         return Err(Error(Kind::TooMany { what: "BLAS nodes", count, limit: LEAF as usize }));
     }
-    let bytes = tree.averages.len().div_ceil(CELLS) * size_of::<Block<M>>();
+    let bytes = tree.averages.len().div_ceil(CELLS) * size_of::<Block>();
     Ok((Root { average: tree.average, node: append(pool, &tree.averages, &tree.divided) }, bytes as f64))
 }
 
@@ -135,8 +131,8 @@ impl Source for ImageOn<'_> {
 }
 
 /// How many levels it takes until cells are fine.
-fn levels<const M: usize>(chart: &Chart) -> u32 {
-    let halvings = level_halvings::<M>();
+fn levels(chart: &Chart) -> u32 {
+    let halvings = LEVEL_HALVINGS;
     let (double_area, longest) = chart.extent();
     let mut levels = 0;
     let mut scale = 1.0;
@@ -144,7 +140,7 @@ fn levels<const M: usize>(chart: &Chart) -> u32 {
         && (0.5 * double_area * scale > FINE_AREA || longest * scale > FINE_LENGTH * FINE_LENGTH)
     {
         levels += 1;
-        scale /= M as f64;
+        scale /= ARITY as f64;
     }
     levels
 }
@@ -170,15 +166,15 @@ impl Memory {
     }
 
     /// The number of nodes that there is memory for, 0 if dividing would not help.
-    fn nodes<const M: usize>(&self, chart: &Chart, texture: &Texture<'_>) -> usize {
+    fn nodes(&self, chart: &Chart, texture: &Texture<'_>) -> usize {
         if chart.covered() < LEAST_TEXELS {
             return 0;
         }
-        let blocks = ((self.most / size_of::<Block<M>>() as f64) as usize).max(M.div_ceil(CELLS));
-        let nodes = blocks * CELLS / M;
+        let blocks = ((self.most / size_of::<Block>() as f64) as usize).max(1);
+        let nodes = blocks * CELLS / ARITY;
         let [w, h] = texture.size().map(f64::from);
         let copies = 0.5 * chart.extent().0 / (w * h);
-        let leaves = ((M - 1) * nodes) as f64;
+        let leaves = ((ARITY - 1) * nodes) as f64;
         let repeats = !texture.wrapping().contains(&Wrap::Clamp);
         if repeats && leaves < LEAVES_PER_COPY * copies { 0 } else { nodes }
     }

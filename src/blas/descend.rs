@@ -1,7 +1,7 @@
 //! From a triangle to a cell of its barycentric domain. One loop serves both verbs: a [`Guide`] either draws the
 //! way or follows a given point, and everything that decides on probabilities is the same.
 
-use super::barycentric::{self, Lattice};
+use super::barycentric::{self, ARITY, Lattice};
 use super::cell::{self, Cell};
 use super::node::{self, Block, LEAF, Root};
 use crate::warp::{Variate, keep_possible, pick, sum};
@@ -12,10 +12,10 @@ pub(crate) trait Shape {
     fn worth(&self, cell: &Cell) -> Worth;
 
     /// The same of all parts of a cell whose average is not zero. `even` is what was said of the cell itself.
-    fn worths<const M: usize>(&self, cell: &Cell, texture: &Parts<'_, M>, _even: bool) -> Worths<M> {
-        let mut worths = Worths { weights: [0.0; M], uniform: [true; M], even: [true; M] };
-        for i in (0..M).filter(|&i| texture.averages[i] > 0.0) {
-            let worth = self.worth(&cell.child::<M>(i));
+    fn worths(&self, cell: &Cell, texture: &Parts<'_>, _even: bool) -> Worths {
+        let mut worths = Worths { weights: [0.0; ARITY], uniform: [true; ARITY], even: [true; ARITY] };
+        for i in (0..ARITY).filter(|&i| texture.averages[i] > 0.0) {
+            let worth = self.worth(&cell.child(i));
             (worths.weights[i], worths.uniform[i], worths.even[i]) = (worth.weight, worth.uniform, worth.even);
         }
         worths
@@ -23,18 +23,18 @@ pub(crate) trait Shape {
 }
 
 /// The texture on the parts of a cell.
-pub(crate) struct Parts<'a, const M: usize> {
-    blocks: &'a [Block<M>],
+pub(crate) struct Parts<'a> {
+    blocks: &'a [Block],
     node: u32,
     /// Relative average weights.
-    pub(crate) averages: [f32; M],
+    pub(crate) averages: [f32; ARITY],
 }
 
-impl<const M: usize> Parts<'_, M> {
+impl Parts<'_> {
     /// Where the weight of each part has its centre, by corner of the part, as far as the next level shows.
     #[inline]
-    pub(crate) fn centers(&self) -> [[f32; M]; 3] {
-        let mut centers = [[1.0 / 3.0; M]; 3];
+    pub(crate) fn centers(&self) -> [[f32; ARITY]; 3] {
+        let mut centers = [[1.0 / 3.0; ARITY]; 3];
         if self.node == LEAF {
             return centers;
         }
@@ -45,7 +45,7 @@ impl<const M: usize> Parts<'_, M> {
             }
             let averages = node::averages(self.blocks, below);
             let total: f32 = averages.iter().sum();
-            for (k, weights) in cell::center_weights::<M>().iter().enumerate() {
+            for (k, weights) in cell::center_weights().iter().enumerate() {
                 let sum: f32 = weights.iter().zip(&averages).map(|(w, a)| w * a).sum();
                 centers[k][i] = sum / total;
             }
@@ -67,24 +67,24 @@ pub(crate) struct Worth {
 
 /// What [`Shape`] says of the parts of a cell.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Worths<const M: usize> {
+pub(crate) struct Worths {
     /// See [`Worth::weight`].
-    pub(crate) weights: [f32; M],
+    pub(crate) weights: [f32; ARITY],
     /// See [`Worth::uniform`].
-    pub(crate) uniform: [bool; M],
+    pub(crate) uniform: [bool; ARITY],
     /// See [`Worth::even`].
-    pub(crate) even: [bool; M],
+    pub(crate) even: [bool; ARITY],
 }
 
 /// What leads a descent from a cell to one of its children.
 pub(crate) trait Guide {
     /// Chooses one of the children, of which at least one has a positive weight.
-    fn choose<const M: usize>(&mut self, weights: &[f32; M]) -> usize;
+    fn choose(&mut self, weights: &[f32; ARITY]) -> usize;
 }
 
 /// Draws the way in proportion to the weights.
 ///
-/// One variate chooses a group of `√M` successive children, the other a child of the group. Each cell stands for an
+/// One variate chooses a group of [`barycentric::EDGE_CELLS`] successive children, the other a child of the group. Each cell stands for an
 /// upright rectangle of the unit square; where all weights are equal, for a square of a binary grid, so that the
 /// points of a net fall one to a cell.
 #[derive(Clone, Copy, Debug)]
@@ -110,14 +110,13 @@ impl Draw {
 
 impl Guide for Draw {
     #[inline]
-    fn choose<const M: usize>(&mut self, weights: &[f32; M]) -> usize {
-        let r = barycentric::edge_cells::<M>() as usize;
-        // No arity has more than eight groups.
-        let mut groups = [0.0; 8];
+    fn choose(&mut self, weights: &[f32; ARITY]) -> usize {
+        let r = barycentric::EDGE_CELLS as usize;
+        let mut groups = [0.0; barycentric::EDGE_CELLS as usize];
         for (group, members) in groups.iter_mut().zip(weights.chunks_exact(r)) {
             *group = members.iter().sum();
         }
-        let group = pick(&groups[..r], sum(&groups[..r]), &mut self.u[1]);
+        let group = pick(&groups, sum(&groups), &mut self.u[1]);
         let members = &weights[group * r..][..r];
         group * r + pick(members, sum(members), &mut self.u[0])
     }
@@ -143,18 +142,18 @@ impl Follow {
 
 impl Guide for Follow {
     #[inline]
-    fn choose<const M: usize>(&mut self, _weights: &[f32; M]) -> usize {
-        let (index, local) = barycentric::child::<M>(self.local, self.size);
+    fn choose(&mut self, _weights: &[f32; ARITY]) -> usize {
+        let (index, local) = barycentric::child(self.local, self.size);
         self.local = local;
-        self.size >>= barycentric::level_halvings::<M>();
+        self.size >>= barycentric::LEVEL_HALVINGS;
         index
     }
 }
 
 /// Descends from the whole triangle to a cell over which the density is constant. Returns it with its probability;
 /// `None` where nothing can arrive from the cell that the guide leads to.
-pub(crate) fn descend<const M: usize>(
-    blocks: &[Block<M>],
+pub(crate) fn descend(
+    blocks: &[Block],
     root: Root,
     vertices: [glam::Vec3; 3],
     shape: &impl Shape,
@@ -165,8 +164,8 @@ pub(crate) fn descend<const M: usize>(
 
 /// [`descend`] from a cell and the node below it.
 #[inline]
-pub(crate) fn descend_below<const M: usize>(
-    blocks: &[Block<M>],
+pub(crate) fn descend_below(
+    blocks: &[Block],
     mut node: u32,
     mut cell: Cell,
     shape: &impl Shape,
@@ -181,13 +180,13 @@ pub(crate) fn descend_below<const M: usize>(
         (uniform, even) = (worth.uniform, worth.even);
     }
     let mut pmf = 1.0;
-    let smallest = barycentric::LATTICE >> (barycentric::MAX_DEPTH - barycentric::level_halvings::<M>());
+    let smallest = barycentric::LATTICE >> (barycentric::MAX_DEPTH - barycentric::LEVEL_HALVINGS);
     while cell.domain.size >= smallest && (node != LEAF || !uniform) {
         let parts =
-            Parts { blocks, node, averages: if node == LEAF { [1.0; M] } else { node::averages(blocks, node) } };
+            Parts { blocks, node, averages: if node == LEAF { [1.0; ARITY] } else { node::averages(blocks, node) } };
         let averages = &parts.averages;
         let worths = shape.worths(&cell, &parts, even);
-        let mut weights: [f32; M] = core::array::from_fn(|i| averages[i] * worths.weights[i]);
+        let mut weights: [f32; ARITY] = core::array::from_fn(|i| averages[i] * worths.weights[i]);
         keep_possible(&mut weights, |i| averages[i] > 0.0 && worths.weights[i] > 0.0);
         let total = sum(&weights);
         if total == 0.0 {
@@ -201,7 +200,7 @@ pub(crate) fn descend_below<const M: usize>(
         if node != LEAF {
             node = node::below(blocks, node, index);
         }
-        cell = cell.child::<M>(index);
+        cell = cell.child(index);
         (uniform, even) = (worths.uniform[index], worths.even[index]);
     }
     Some((cell, pmf))

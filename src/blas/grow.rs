@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::blas::barycentric::Cell;
+use crate::blas::barycentric::{ARITY, Cell};
 use crate::blas::coverage::storable;
 use crate::blas::touched::Range;
 
@@ -64,7 +64,7 @@ struct Measured {
 }
 
 /// Grows the tree of a triangle in which look-ups are not all the same. It has no nodes if that is not worth one.
-pub(crate) fn grow<const M: usize, S: Source>(source: &S, range: Range, limits: &Limits) -> Result<Tree, S::Fault> {
+pub(crate) fn grow<S: Source>(source: &S, range: Range, limits: &Limits) -> Result<Tree, S::Fault> {
     // The whole triangle stands in front, as the only cell of a node before the first.
     let mut growing = Growing { source, averages: alloc::vec![0.0], divided: alloc::vec![false], mass: 0.0 };
     let mut open = alloc::vec![Open { cell: Cell::root(), range, at: 0 }];
@@ -75,10 +75,10 @@ pub(crate) fn grow<const M: usize, S: Source>(source: &S, range: Range, limits: 
         open = growing.choose(open, room, spare, share)?;
         nodes += open.len();
         level += 1;
-        share /= M as f64;
-        open = growing.divide::<M>(open, level >= limits.fine, share)?;
+        share /= ARITY as f64;
+        open = growing.divide(open, level >= limits.fine, share)?;
     }
-    Ok(growing.finish::<M>())
+    Ok(growing.finish())
 }
 
 struct Growing<'a, S> {
@@ -127,11 +127,11 @@ impl<S: Source> Growing<'_, S> {
     }
 
     /// Adds the nodes below cells. Returns those of their cells over which look-ups differ.
-    fn divide<const M: usize>(&mut self, open: Vec<Open>, exact: bool, share: f64) -> Result<Vec<Open>, S::Fault> {
-        let children: Vec<[(Cell, Range); M]> = map(&open, |open| {
-            let mut children = [(open.cell, open.range); M];
+    fn divide(&mut self, open: Vec<Open>, exact: bool, share: f64) -> Result<Vec<Open>, S::Fault> {
+        let children: Vec<[(Cell, Range); ARITY]> = map(&open, |open| {
+            let mut children = [(open.cell, open.range); ARITY];
             for (slot, (cell, range)) in children.iter_mut().enumerate() {
-                *cell = open.cell.child::<M>(slot);
+                *cell = open.cell.child(slot);
                 *range = self.source.range(*cell, exact)?;
             }
             Ok(children)
@@ -159,14 +159,14 @@ impl<S: Source> Growing<'_, S> {
     }
 
     /// Sets the average of every divided cell to the mean of its node.
-    fn finish<const M: usize>(mut self) -> Tree {
+    fn finish(mut self) -> Tree {
         let mut end = self.averages.len();
         for at in (0..self.averages.len()).rev() {
             if self.divided[at] {
-                let node = &self.averages[end - M..end];
-                let mean = node.iter().map(|average| f64::from(*average)).sum::<f64>() / M as f64;
+                let node = &self.averages[end - ARITY..end];
+                let mean = node.iter().map(|average| f64::from(*average)).sum::<f64>() / ARITY as f64;
                 self.averages[at] = storable(mean);
-                end -= M;
+                end -= ARITY;
             }
         }
         let average = self.averages[0];

@@ -1,6 +1,6 @@
 //! The tree over one triangle's barycentric domain (Ogaki, "Generalized Light Portals", HPG 2020).
 //!
-//! A node has `M = R²` children, `R` to an edge of the triangle; their values are the average weights of the
+//! A node has [`ARITY`] children; their values are the average weights of the
 //! texture over them. The tree knows nothing of the triangle's shape, only of its texture coordinates, so that
 //! every triangle with the same texture and coordinates can share it.
 
@@ -21,7 +21,7 @@ mod texture;
 mod touched;
 mod validate;
 
-pub(crate) use barycentric::{Cell as Domain, Lattice};
+pub(crate) use barycentric::{ARITY, Cell as Domain, Lattice};
 pub(crate) use build::build;
 pub(crate) use cell::{Cell, at_corners, centers};
 pub(crate) use coverage::{MAX_AVERAGE, storable};

@@ -1,13 +1,14 @@
 //! What a BLAS is made of: plain data, in one pool for all triangles of a sampler.
 //!
-//! A node is `M` cells in the order of [`barycentric::child`](crate::blas::barycentric::child); node `i` owns the
-//! cells from `i M` on. The nodes of a tree are numbered breadth first, so that the nodes below the cells of a block
+//! A node is [`ARITY`] cells in the order of [`barycentric::child`](crate::blas::barycentric::child); node `i` owns the
+//! cells from `i ARITY` on. The nodes of a tree are numbered breadth first, so that the nodes below the cells of a block
 //! have successive numbers, and a bit a cell tells them all (Jacobson 1989, level-order unary degree sequence).
 
 use alloc::vec::Vec;
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::blas::barycentric::ARITY;
 use crate::blas::code::{LARGEST, decode, encode};
 
 /// Stands for "no node below": the weight is taken for constant over the cell.
@@ -16,17 +17,17 @@ pub(crate) const LEAF: u32 = u32::MAX;
 /// Cells of a block. A tree starts at the first cell of one.
 pub(crate) const CELLS: usize = 32;
 
-/// Successive cells: eight nodes of arity 4, two of arity 16, half of one of arity 64.
+/// Successive cells: eight nodes.
 ///
 /// Word 0 has the bit of every cell that has a node below, word 1 the number of the first such node. The bytes of the
 /// others are the [codes](crate::blas::code) of the average weights over the cells.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub(crate) struct Block<const M: usize>([u32; 2 + CELLS / 4]);
+pub(crate) struct Block([u32; 2 + CELLS / 4]);
 
-const _: () = assert!(size_of::<Block<4>>() == 40);
+const _: () = assert!(size_of::<Block>() == 40 && CELLS % ARITY == 0);
 
-impl<const M: usize> Block<M> {
+impl Block {
     #[inline(always)]
     fn codes(&self) -> &[u8; CELLS] {
         let bytes: &[u8; 8 + CELLS] = bytemuck::cast_ref(&self.0);
@@ -42,20 +43,16 @@ impl<const M: usize> Block<M> {
 
 /// Relative average weights over the cells of a node. Positive wherever any look-up in the cell is.
 #[inline(always)]
-pub(crate) fn averages<const M: usize>(blocks: &[Block<M>], node: u32) -> [f32; M] {
-    let first = node as usize * M;
-    let mut averages = [0.0; M];
-    for (part, averages) in averages.chunks_mut(CELLS).enumerate() {
-        let codes = &blocks[first / CELLS + part].codes()[first % CELLS..][..M.min(CELLS)];
-        averages.iter_mut().zip(codes).for_each(|(average, code)| *average = decode(*code));
-    }
-    averages
+pub(crate) fn averages(blocks: &[Block], node: u32) -> [f32; ARITY] {
+    let first = node as usize * ARITY;
+    let codes = &blocks[first / CELLS].codes()[first % CELLS..][..ARITY];
+    core::array::from_fn(|i| decode(codes[i]))
 }
 
 /// The node below a cell of a node, or [`LEAF`].
 #[inline(always)]
-pub(crate) fn below<const M: usize>(blocks: &[Block<M>], node: u32, cell: usize) -> u32 {
-    let at = node as usize * M + cell;
+pub(crate) fn below(blocks: &[Block], node: u32, cell: usize) -> u32 {
+    let at = node as usize * ARITY + cell;
     let [divided, first, ..] = blocks[at / CELLS].0;
     let bit = 1 << (at % CELLS);
     if divided & bit == 0 { LEAF } else { first.wrapping_add((divided & (bit - 1)).count_ones()) }
@@ -63,8 +60,8 @@ pub(crate) fn below<const M: usize>(blocks: &[Block<M>], node: u32, cell: usize)
 
 /// Mean of a node's relative averages.
 #[inline]
-pub(crate) fn mean<const M: usize>(blocks: &[Block<M>], node: u32) -> f32 {
-    averages(blocks, node).iter().sum::<f32>() / M as f32
+pub(crate) fn mean(blocks: &[Block], node: u32) -> f32 {
+    averages(blocks, node).iter().sum::<f32>() / ARITY as f32
 }
 
 /// The BLAS of one triangle.
@@ -88,7 +85,7 @@ impl Root {
 /// order of the nodes. Returns the number of its first node.
 ///
 /// The caller has made sure with [`end`] that numbers suffice.
-pub(crate) fn append<const M: usize>(blocks: &mut Vec<Block<M>>, averages: &[f32], divided: &[bool]) -> u32 {
+pub(crate) fn append(blocks: &mut Vec<Block>, averages: &[f32], divided: &[bool]) -> u32 {
     let root = first_free(blocks);
     let largest = averages.iter().fold(f32::MIN_POSITIVE, |largest, average| largest.max(*average));
     let mut next = root + 1;
@@ -107,16 +104,16 @@ pub(crate) fn append<const M: usize>(blocks: &mut Vec<Block<M>>, averages: &[f32
 }
 
 /// The number that the next tree's first node gets.
-fn first_free<const M: usize>(blocks: &[Block<M>]) -> u32 {
-    (blocks.len() * CELLS / M) as u32
+fn first_free(blocks: &[Block]) -> u32 {
+    (blocks.len() * CELLS / ARITY) as u32
 }
 
 /// The number of nodes in the pool after a tree of `nodes` was appended.
-pub(crate) fn end<const M: usize>(blocks: &[Block<M>], nodes: usize) -> usize {
-    blocks.len() * CELLS / M + nodes
+pub(crate) fn end(blocks: &[Block], nodes: usize) -> usize {
+    blocks.len() * CELLS / ARITY + nodes
 }
 
 /// Whether the tree of a root, if there is one, starts in this part of a pool.
-pub(crate) fn holds<const M: usize>(blocks: &[Block<M>], root: Root) -> bool {
+pub(crate) fn holds(blocks: &[Block], root: Root) -> bool {
     root.node == LEAF || (root.node as usize) < end(blocks, 0)
 }

@@ -5,7 +5,7 @@ use core::fmt;
 
 use glam::{DVec2, Vec2};
 
-use crate::blas::barycentric::{Cell, LATTICE, MAX_DEPTH, level_halvings};
+use crate::blas::barycentric::{ARITY, Cell, LATTICE, LEVEL_HALVINGS, MAX_DEPTH};
 use crate::blas::build::store;
 use crate::blas::coverage::storable;
 use crate::blas::grow::{Limits, Source, grow};
@@ -117,11 +117,11 @@ impl<'a> Function<'a> {
 /// # Errors
 ///
 /// If a bound is not one, a weight is outside of its bound, or the pool has no more indices. The pool is then as it was.
-pub(crate) fn build_procedural<const M: usize>(
+pub(crate) fn build_procedural(
     function: &mut Function<'_>,
     mesh: usize,
     uv: [Vec2; 3],
-    pool: &mut Vec<Block<M>>,
+    pool: &mut Vec<Block>,
 ) -> Result<Root, Error> {
     let source = FunctionOn::new(function.function, uv);
     let fail = |fault: Fault| Error(fault.kind(mesh));
@@ -130,10 +130,10 @@ pub(crate) fn build_procedural<const M: usize>(
         return Ok(Root::constant(storable(f64::from(range.max))));
     }
     let most = (OWN_BYTES + function.extra).min(MAX_BYTES);
-    let blocks = ((most / size_of::<Block<M>>() as f64) as usize).max(M.div_ceil(CELLS));
-    let deepest = MAX_DEPTH / level_halvings::<M>();
-    let limits = Limits { nodes: blocks * CELLS / M, fine: 0, deepest, variance: VARIANCE };
-    let tree = grow::<M, _>(&source, range, &limits).map_err(fail)?;
+    let blocks = ((most / size_of::<Block>() as f64) as usize).max(1);
+    let deepest = MAX_DEPTH / LEVEL_HALVINGS;
+    let limits = Limits { nodes: blocks * CELLS / ARITY, fine: 0, deepest, variance: VARIANCE };
+    let tree = grow(&source, range, &limits).map_err(fail)?;
     let (root, bytes) = store(&tree, pool)?;
     function.extra -= (bytes - OWN_BYTES).max(0.0).min(function.extra);
     Ok(root)

@@ -2,29 +2,28 @@
 
 use alloc::vec;
 
-use crate::blas::barycentric::{MAX_DEPTH, level_halvings};
+use crate::blas::barycentric::{ARITY, LEVEL_HALVINGS, MAX_DEPTH};
 use crate::blas::coverage::MAX_AVERAGE;
 use crate::blas::node::{Block, CELLS, LEAF, Root, averages, below};
 use crate::error::Error;
 
 /// Number of nodes that a pool has place for.
-fn node_count<const M: usize>(blocks: &[Block<M>]) -> usize {
-    blocks.len() * CELLS / M
+fn node_count(blocks: &[Block]) -> usize {
+    blocks.len() * CELLS / ARITY
 }
 
-fn is_lit<const M: usize>(blocks: &[Block<M>], node: u32) -> bool {
+fn is_lit(blocks: &[Block], node: u32) -> bool {
     averages(blocks, node).iter().any(|average| *average > 0.0)
 }
 
 /// Checks a pool: afterwards every descent from any node ends, stays in bounds, and finds a positive cell below every
 /// positive cell.
-pub(crate) fn validate<const M: usize>(blocks: &[Block<M>]) -> Result<(), Error> {
+pub(crate) fn validate(blocks: &[Block]) -> Result<(), Error> {
     let count = node_count(blocks);
-    Error::unless_equal("number of cells", blocks.len() * CELLS, count * M)?;
     if count >= LEAF as usize {
         return Err(Error::bytes("number of nodes", 0, count, LEAF - 1));
     }
-    let max_levels = MAX_DEPTH / level_halvings::<M>();
+    let max_levels = MAX_DEPTH / LEVEL_HALVINGS;
     // A node's level: how many nodes are above it on the longest way. Ways lead up in the pool only.
     let mut levels = vec![1u8; count];
     for node in 0..count as u32 {
@@ -55,13 +54,13 @@ pub(crate) fn validate<const M: usize>(blocks: &[Block<M>]) -> Result<(), Error>
     Ok(())
 }
 
-fn is_divided<const M: usize>(blocks: &[Block<M>], node: u32, cell: usize) -> bool {
-    let at = node as usize * M + cell;
+fn is_divided(blocks: &[Block], node: u32, cell: usize) -> bool {
+    let at = node as usize * ARITY + cell;
     blocks[at / CELLS].divided() >> (at % CELLS) & 1 == 1
 }
 
 /// Checks the roots into a pool that [`validate`] has passed.
-pub(crate) fn validate_roots<const M: usize>(roots: &[Root], blocks: &[Block<M>]) -> Result<(), Error> {
+pub(crate) fn validate_roots(roots: &[Root], blocks: &[Block]) -> Result<(), Error> {
     let count = node_count(blocks);
     for (i, root) in roots.iter().enumerate() {
         // NaN fails.
@@ -88,7 +87,7 @@ mod tests {
     use alloc::vec::Vec;
 
     /// Each node but the last has one below its cell 2.
-    fn chain(n: usize) -> Vec<Block<4>> {
+    fn chain(n: usize) -> Vec<Block> {
         let averages: Vec<f32> = (0..4 * n).map(|i| if i % 4 == 2 { 1.0 } else { 0.0 }).collect();
         let divided: Vec<bool> = (0..4 * n).map(|i| i % 4 == 2 && i + 4 < 4 * n).collect();
         let mut blocks = Vec::new();
@@ -97,7 +96,7 @@ mod tests {
     }
 
     /// The same with one byte changed.
-    fn changed(n: usize, at: usize, value: u8) -> Vec<Block<4>> {
+    fn changed(n: usize, at: usize, value: u8) -> Vec<Block> {
         let mut blocks = chain(n);
         bytemuck::cast_slice_mut(&mut blocks)[at] = value;
         blocks
@@ -105,7 +104,7 @@ mod tests {
 
     #[test]
     fn bytes_from_outside() {
-        assert!(validate::<4>(&[]).is_ok());
+        assert!(validate(&[]).is_ok());
         assert!(validate(&chain(20)).is_ok());
         assert!(validate(&chain(21)).is_err());
         assert!(validate(&changed(3, 8 + 2, 9)).is_ok());
@@ -120,15 +119,13 @@ mod tests {
             bytemuck::cast_slice_mut::<_, u8>(&mut blocks)[4..8].copy_from_slice(&number);
             assert!(validate(&blocks).is_err(), "{number:?}");
         }
-        // Half a node of arity 64.
-        assert!(validate::<64>(&[bytemuck::Zeroable::zeroed()]).is_err());
     }
 
     #[test]
     fn roots_from_outside() {
         let blocks = chain(2);
         for bad in [f32::NAN, f32::INFINITY, -1.0, 1e31] {
-            assert!(validate_roots::<4>(&[Root::constant(bad)], &blocks).is_err());
+            assert!(validate_roots(&[Root::constant(bad)], &blocks).is_err());
         }
         assert!(validate_roots(&[Root { average: 0.25, node: 1 }, Root::constant(0.0)], &blocks).is_ok());
         assert!(validate_roots(&[Root { average: 0.25, node: 8 }], &blocks).is_err());

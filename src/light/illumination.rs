@@ -47,12 +47,12 @@ impl Illumination {
 
     /// The estimates for cells of one size in a plane. Zero only below the horizon; never NaN, possibly infinite.
     #[inline(always)]
-    pub(crate) fn estimate<const M: usize>(
+    pub(crate) fn estimate<const COUNT: usize>(
         self,
         receiver: &Receiver,
-        cells: &Views<M>,
+        cells: &Views<COUNT>,
         vertices: impl Fn(usize) -> [Vec3; 3],
-    ) -> [f32; M] {
+    ) -> [f32; COUNT] {
         let mut estimates = match self {
             Self::ClampedVertices => clamped_vertices(receiver, cells),
             _ => core::array::from_fn(|i| self.at_center(receiver, cells, i, &vertices)),
@@ -68,10 +68,10 @@ impl Illumination {
     }
 
     /// The terms that look at the centre of a cell.
-    fn at_center<const M: usize>(
+    fn at_center<const COUNT: usize>(
         self,
         receiver: &Receiver,
-        cells: &Views<M>,
+        cells: &Views<COUNT>,
         i: usize,
         vertices: &impl Fn(usize) -> [Vec3; 3],
     ) -> f32 {
@@ -94,15 +94,15 @@ impl Illumination {
 }
 
 /// Cells of one size in a plane as a shading point sees them.
-pub(crate) struct Views<const M: usize> {
+pub(crate) struct Views<const COUNT: usize> {
     /// Heights of the corners over the receiver's plane, if it has a normal.
-    pub(crate) heights: [[f32; M]; 3],
+    pub(crate) heights: [[f32; COUNT]; 3],
     /// Weights of the corners.
-    pub(crate) weights: [[f32; M]; 3],
+    pub(crate) weights: [[f32; COUNT]; 3],
     /// Below the horizon for certain is what is lower than this.
     pub(crate) horizon: f32,
     /// Squared distances of the centres; positive.
-    pub(crate) distance2: [f32; M],
+    pub(crate) distance2: [f32; COUNT],
     /// Area of each.
     pub(crate) area: f32,
     /// Distance of the shading point from their plane.
@@ -111,10 +111,10 @@ pub(crate) struct Views<const M: usize> {
 
 /// The default. Neither square roots nor branches on a surface, so that cells share vector registers.
 #[inline(always)]
-fn clamped_vertices<const M: usize>(receiver: &Receiver, cells: &Views<M>) -> [f32; M] {
+fn clamped_vertices<const COUNT: usize>(receiver: &Receiver, cells: &Views<COUNT>) -> [f32; COUNT] {
     let [[a, b, c], [p, q, r]] = [&cells.heights, &cells.weights];
-    let softened: [f32; M] = core::array::from_fn(|i| cells.distance2[i] + SOFTENING * cells.area);
-    let toward: [f32; M] = match receiver {
+    let softened: [f32; COUNT] = core::array::from_fn(|i| cells.distance2[i] + SOFTENING * cells.area);
+    let toward: [f32; COUNT] = match receiver {
         Receiver::Surface(_) => {
             core::array::from_fn(|i| p[i] * a[i].max(0.0) + q[i] * b[i].max(0.0) + r[i] * c[i].max(0.0))
         }

@@ -45,19 +45,12 @@ impl Sunlit<'_> {
 
     /// Finds the parts of the triangle that the sun is seen through, and what it sends through each. A part is all of
     /// one opacity, or small.
-    pub(crate) fn visit<const M: usize>(&self, blocks: &[Block<M>], root: Root, found: &mut impl FnMut(Part, f32)) {
+    pub(crate) fn visit(&self, blocks: &[Block], root: Root, found: &mut impl FnMut(Part, f32)) {
         let scale = if root.node == LEAF { 1.0 } else { root.average / blas::mean(blocks, root.node) };
         self.visit_below(blocks, &Cell::root(self.lit.vertices), root, scale, found);
     }
 
-    fn visit_below<const M: usize>(
-        &self,
-        blocks: &[Block<M>],
-        cell: &Cell,
-        below: Root,
-        scale: f32,
-        found: &mut impl FnMut(Part, f32),
-    ) {
+    fn visit_below(&self, blocks: &[Block], cell: &Cell, below: Root, scale: f32, found: &mut impl FnMut(Part, f32)) {
         let opening = self.opening(cell.domain);
         if below.average == 0.0 || self.environment.cover_of_sun(self.sun, &opening) == Cover::Nothing {
             return;
@@ -72,12 +65,12 @@ impl Sunlit<'_> {
         let averages = blas::averages(blocks, below.node);
         for (i, average) in averages.into_iter().enumerate() {
             let root = Root { average: average * scale, node: blas::below(blocks, below.node, i) };
-            self.visit_below(blocks, &cell.child::<M>(i), root, scale, found);
+            self.visit_below(blocks, &cell.child(i), root, scale, found);
         }
     }
 
     /// Draws a point in a part.
-    pub(crate) fn sample<const M: usize>(&self, blocks: &[Block<M>], part: Part, u: [Variate; 2]) -> Option<Lattice> {
+    pub(crate) fn sample(&self, blocks: &[Block], part: Part, u: [Variate; 2]) -> Option<Lattice> {
         if part.node == LEAF {
             return self.sample_in(part.domain, Some(part.through), u);
         }
@@ -96,7 +89,7 @@ impl Sunlit<'_> {
     }
 
     /// Density per solid angle with which [`Self::sample`] draws a point of the part, over the sun's excess there.
-    pub(crate) fn pdf_per_excess<const M: usize>(&self, blocks: &[Block<M>], part: Part, place: Lattice) -> f64 {
+    pub(crate) fn pdf_per_excess(&self, blocks: &[Block], part: Part, place: Lattice) -> f64 {
         if part.node == LEAF {
             return 1.0 / f64::from(part.through);
         }

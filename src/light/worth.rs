@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::illumination::Views;
 use super::triangle::Lit;
-use crate::blas::{self, Cell, Parts, Shape, Worth, Worths};
+use crate::blas::{self, ARITY, Cell, Parts, Shape, Worth, Worths};
 use crate::env::Footprint;
 
 /// Ratio of squared radius to squared distance up to which the geometry is taken for the same all over a cell.
@@ -31,18 +31,18 @@ impl Lit<'_> {
 
     /// Parts of one cell. `corners` and `centers` are by coordinate; the share is that of one part.
     #[inline(always)]
-    fn judge<const M: usize>(
+    fn judge<const COUNT: usize>(
         &self,
-        parts: &Places<M>,
-        averages: &[f32; M],
+        parts: &Places<COUNT>,
+        averages: &[f32; COUNT],
         even: bool,
         vertices: impl Fn(usize) -> [Vec3; 3],
-    ) -> Worths<M> {
+    ) -> Weighed<COUNT> {
         let [x, y, z] = &parts.centers;
         let least = (self.height * self.height).max(f32::MIN_POSITIVE);
-        let distance2: [f32; M] = core::array::from_fn(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).max(least));
+        let distance2: [f32; COUNT] = core::array::from_fn(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).max(least));
         let area = self.area * parts.share;
-        let shifted2: [f32; M] = match &parts.weighted {
+        let shifted2: [f32; COUNT] = match &parts.weighted {
             Some([x, y, z]) => core::array::from_fn(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).max(least)),
             None => distance2,
         };
@@ -56,14 +56,14 @@ impl Lit<'_> {
         };
         let mut weights = self.illumination.estimate(&self.receiver, &views, vertices);
         let radius2 = self.radius2 * parts.share;
-        let far: [bool; M] = core::array::from_fn(|i| {
+        let far: [bool; COUNT] = core::array::from_fn(|i| {
             radius2 <= FAR * distance2[i] && self.is_evenly_lifted(parts.heights.map(|height| height[i]))
         });
         let Some(environment) = self.environment.filter(|_| !even) else {
-            return Worths { weights, uniform: far, even: [true; M] };
+            return Weighed { weights, uniform: far, even: [true; COUNT] };
         };
-        let (mut uniform, mut is_even) = (far, [false; M]);
-        for i in 0..M {
+        let (mut uniform, mut is_even) = (far, [false; COUNT]);
+        for i in 0..COUNT {
             if averages[i] == 0.0 || weights[i] == 0.0 {
                 continue;
             }
@@ -74,20 +74,30 @@ impl Lit<'_> {
             uniform[i] = one_texel || (seen.even && far[i]);
             is_even[i] = one_texel || seen.even;
         }
-        Worths { weights, uniform, even: is_even }
+        Weighed { weights, uniform, even: is_even }
     }
 }
 
+/// What weighing finds out about cells of one size.
+struct Weighed<const COUNT: usize> {
+    /// See [`Worth::weight`].
+    weights: [f32; COUNT],
+    /// See [`Worth::uniform`].
+    uniform: [bool; COUNT],
+    /// See [`Worth::even`].
+    even: [bool; COUNT],
+}
+
 /// Where the parts of a cell lie.
-struct Places<const M: usize> {
+struct Places<const COUNT: usize> {
     /// Of their corners over the receiver's plane.
-    heights: [[f32; M]; 3],
+    heights: [[f32; COUNT]; 3],
     /// Of the corners in the centre of the texture's weight.
-    weights: [[f32; M]; 3],
+    weights: [[f32; COUNT]; 3],
     /// By coordinate.
-    centers: [[f32; M]; 3],
+    centers: [[f32; COUNT]; 3],
     /// The centre of the texture's weight.
-    weighted: Option<[[f32; M]; 3]>,
+    weighted: Option<[[f32; COUNT]; 3]>,
     /// Of each in the whole triangle's area.
     share: f32,
 }
@@ -103,20 +113,20 @@ impl Shape for Lit<'_> {
             weighted: None,
             share: cell.share(),
         };
-        let Worths { weights: [weight], uniform: [uniform], even: [even] } =
+        let Weighed { weights: [weight], uniform: [uniform], even: [even] } =
             self.judge(&parts, &[1.0], false, |_| cell.vertices);
         Worth { weight, uniform, even }
     }
 
     #[inline]
-    fn worths<const M: usize>(&self, cell: &Cell, texture: &Parts<'_, M>, even: bool) -> Worths<M> {
+    fn worths(&self, cell: &Cell, texture: &Parts<'_>, even: bool) -> Worths {
         let [a, b, c] = cell.vertices;
         let center = (a + b + c) * (1.0 / 3.0);
         let is_near = self.radius2 * cell.share() > NEAR * center.length_squared();
-        let weights = if is_near { texture.centers() } else { [[1.0 / 3.0; M]; 3] };
+        let weights = if is_near { texture.centers() } else { [[1.0 / 3.0; ARITY]; 3] };
         let weighted = is_near.then(|| {
             [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]].map(|values| {
-                let corners = blas::at_corners::<M>(values);
+                let corners = blas::at_corners(values);
                 core::array::from_fn(|i| (0..3).map(|k| corners[k][i] * weights[k][i]).sum::<f32>())
             })
         });
@@ -125,9 +135,11 @@ impl Shape for Lit<'_> {
             weights,
             weighted,
             centers: blas::centers(&cell.vertices),
-            share: cell.share() * (1.0 / M as f32),
+            share: cell.share() * (1.0 / ARITY as f32),
         };
-        self.judge(&parts, &texture.averages, even, |i| cell.child::<M>(i).vertices)
+        let Weighed { weights, uniform, even } =
+            self.judge(&parts, &texture.averages, even, |i| cell.child(i).vertices);
+        Worths { weights, uniform, even }
     }
 }
 

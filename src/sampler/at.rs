@@ -9,32 +9,32 @@ use crate::record::ShadingPoint;
 /// Every question to a [`LightSampler`] begins with a search for the suns behind the portals. A host that asks more
 /// than one at the same point saves all searches but the first; the answers are the same.
 #[derive(Clone, Copy, Debug)]
-pub struct PointSampler<'a, const N: usize = 16, const M: usize = 4> {
-    pub(super) lights: LightSamplerView<'a, N, M>,
+pub struct PointSampler<'a, const N: usize = 16> {
+    pub(super) lights: LightSamplerView<'a, N>,
     pub(super) x: ShadingPoint,
     pub(super) techniques: Techniques,
     /// Weights of the tree's first choice, where they are known already.
     pub(super) first_weights: Option<[f32; N]>,
 }
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const N: usize> LightSampler<N> {
     /// The lights as seen from one shading point, for more than one question about it.
     #[inline]
-    pub fn at(&self, x: &ShadingPoint) -> PointSampler<'_, N, M> {
+    pub fn at(&self, x: &ShadingPoint) -> PointSampler<'_, N> {
         self.as_view().into_at(x)
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+impl<'a, const N: usize> LightSamplerView<'a, N> {
     /// The lights as seen from one shading point, for more than one question about it.
     #[inline]
-    pub fn at(&self, x: &ShadingPoint) -> PointSampler<'a, N, M> {
+    pub fn at(&self, x: &ShadingPoint) -> PointSampler<'a, N> {
         self.into_at(x)
     }
 
     /// The same of a view that is not needed any more.
     #[inline(always)]
-    fn into_at(self, x: &ShadingPoint) -> PointSampler<'a, N, M> {
+    fn into_at(self, x: &ShadingPoint) -> PointSampler<'a, N> {
         if self.has_suns() {
             let (techniques, first_weights) = self.weigh(x);
             return PointSampler { lights: self, x: *x, techniques, first_weights };

@@ -25,10 +25,10 @@ enum Surface<'a> {
 /// Collects the lights of a scene and builds a [`LightSampler`].
 ///
 /// Everything is checked when it is added; what was accepted can always be sampled. `N` is the arity of the tree
-/// over triangles (4, 8 or 16), `M` that of the trees over textures (4, 16 or 64).
+/// over triangles (4, 8 or 16).
 /// The wider a tree, the better its choices; on machines without AVX, 8 may be faster than the default of 16.
 #[derive(Debug)]
-pub struct LightSamplerBuilder<'a, const N: usize = 16, const M: usize = 4> {
+pub struct LightSamplerBuilder<'a, const N: usize = 16> {
     environment: Option<Environment>,
     illumination: Illumination,
     textures: Vec<Surface<'a>>,
@@ -38,18 +38,18 @@ pub struct LightSamplerBuilder<'a, const N: usize = 16, const M: usize = 4> {
     places: Vec<u32>,
     /// Where each mesh starts in `places`, and the end.
     meshes: Vec<u32>,
-    cells: Vec<blas::Block<M>>,
+    cells: Vec<blas::Block>,
     /// Trees over textures by texture and the bits of the three uvs.
     shared: BTreeMap<(usize, [u32; 6]), Root>,
 }
 
-impl<const N: usize, const M: usize> Default for LightSamplerBuilder<'_, N, M> {
+impl<const N: usize> Default for LightSamplerBuilder<'_, N> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
+impl<'a, const N: usize> LightSamplerBuilder<'a, N> {
     /// A builder without lights, whose environment is white.
     pub fn new() -> Self {
         const { assert!(N == 4 || N == 8 || N == 16, "the arity of the tree over triangles is 4, 8 or 16") };
@@ -124,7 +124,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// # Errors
     ///
     /// If there are more triangles than the tree can number (2^28 - 1).
-    pub fn build(self) -> Result<LightSampler<N, M>, Error> {
+    pub fn build(self) -> Result<LightSampler<N>, Error> {
         self.build_reporting(None)
     }
 
@@ -136,11 +136,11 @@ impl<'a, const N: usize, const M: usize> LightSamplerBuilder<'a, N, M> {
     /// # Errors
     ///
     /// As [`Self::build`], and one of which [`Error::is_cancelled`] is true if `report` has cancelled the build.
-    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler<N, M>, Error> {
+    pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler<N>, Error> {
         self.build_reporting(Some(&report))
     }
 
-    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N, M>, Error> {
+    fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler<N>, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
         let energies = Energies::new(&environment, Scales::default());
         let sends = parallel::collect(self.triangles.len(), |i| energies.energy(&self.triangles[i]) > 0.0);

@@ -38,14 +38,14 @@ struct Header {
     lengths: [u64; BUFFERS],
 }
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const N: usize> LightSampler<N> {
     /// See [`LightSamplerView::to_bytes`].
     pub fn to_bytes(&self) -> Vec<u8> {
         self.as_view().to_bytes()
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+impl<'a, const N: usize> LightSamplerView<'a, N> {
     /// Everything as bytes, to be written to disk, mapped, shared or uploaded, and to be read by
     /// [`Self::from_bytes`] on a machine of the same byte order.
     pub fn to_bytes(&self) -> Vec<u8> {
@@ -54,7 +54,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
             magic: MAGIC,
             version: VERSION,
             byte_order: BYTE_ORDER,
-            arities: [N as u32, M as u32],
+            arities: [N as u32, blas::ARITY as u32],
             illumination: self.illumination as u32,
             energy: self.energy,
             portals: self.portals.into(),
@@ -98,7 +98,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut reader = Reader { bytes, at: 0 };
         let header: Header = reader.value("header")?;
-        header.check(N, M)?;
+        header.check(N, blas::ARITY)?;
         let environment_header: EnvironmentHeader = reader.value("header of the environment")?;
         let [
             nodes,

@@ -9,7 +9,7 @@ use crate::geometry;
 use crate::record::LightSample;
 use crate::tlas::Splitting;
 
-impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+impl<const N: usize> PointSampler<'_, N> {
     /// Density per solid angle with which [`Self::sample`] goes in a direction: the sum over all points of all
     /// lights that the ray from the shading point crosses, found by the crate's own traversal. `direction` need not
     /// have unit length.

@@ -47,8 +47,8 @@ pub struct EmissionSample {
 ///
 /// Made by [`LightSampler::emission`] in some microseconds; holds about 1.5 KB.
 #[derive(Clone, Debug)]
-pub struct Emission<'a, const N: usize = 16, const M: usize = 4> {
-    lights: LightSamplerView<'a, N, M>,
+pub struct Emission<'a, const N: usize = 16> {
+    lights: LightSamplerView<'a, N>,
     directions: Directions,
     /// Probabilities of a ray that does not depend on the direction, and of one from the environment's image.
     shares: [f64; 2],
@@ -64,16 +64,16 @@ impl Shape for Everywhere {
     }
 }
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const N: usize> LightSampler<N> {
     /// See [`LightSamplerView::emission`].
-    pub fn emission(&self) -> Emission<'_, N, M> {
+    pub fn emission(&self) -> Emission<'_, N> {
         self.as_view().emission()
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+impl<'a, const N: usize> LightSamplerView<'a, N> {
     /// Prepares to draw rays of light. To be made anew once the environment was turned.
-    pub fn emission(&self) -> Emission<'a, N, M> {
+    pub fn emission(&self) -> Emission<'a, N> {
         let directions = Directions::new(&self.environment, |direction, radius| {
             let (sin, cos) = math::sin_cos(radius);
             self.outgoing(&self.beam(-direction, [sin, cos]))
@@ -109,7 +109,7 @@ impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
     }
 }
 
-impl<const N: usize, const M: usize> Emission<'_, N, M> {
+impl<const N: usize> Emission<'_, N> {
     /// Draws a ray of light. `u` is uniform in `[0, 1)⁵`: the first chooses the triangle, the next two the point on it,
     /// the last two the direction.
     ///

@@ -9,7 +9,7 @@ use super::lights::{LightSampler, LightSamplerView};
 use crate::record::{Hit, LightSample, ShadingPoint, TriangleId};
 use crate::tlas::Splitting;
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const N: usize> LightSampler<N> {
     /// See [`PointSampler::sample`].
     #[inline]
     pub fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<LightSample> {
@@ -65,7 +65,7 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
     }
 }
 
-impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
+impl<const N: usize> LightSamplerView<'_, N> {
     /// See [`PointSampler::sample`].
     #[inline]
     pub fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<LightSample> {

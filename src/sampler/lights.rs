@@ -17,18 +17,17 @@ pub(super) const NO_LEAF: u32 = u32::MAX;
 /// Marks a triangle that is not in the tree because it has no area.
 pub(super) const NO_AREA: u32 = u32::MAX - 1;
 
-/// All lights of a scene, ready to be sampled. `N` is the arity of the tree over triangles (4, 8 or 16), `M` that of
-/// the trees over textures (4, 16 or 64).
+/// All lights of a scene, ready to be sampled. `N` is the arity of the tree over triangles (4, 8 or 16).
 /// The wider a tree, the better its choices; on machines without AVX, 8 may be faster than the default of 16.
 ///
 /// All that a shading point needs works on [`LightSamplerView`], which borrows plain data; the methods here forward
 /// to it.
 #[derive(Clone, Debug)]
-pub struct LightSampler<const N: usize = 16, const M: usize = 4> {
+pub struct LightSampler<const N: usize = 16> {
     pub(super) tlas: Tlas<N>,
     /// In the order of the tree's leaves.
     pub(super) triangles: Vec<LightTriangle>,
-    pub(super) cells: Vec<blas::Block<M>>,
+    pub(super) cells: Vec<blas::Block>,
     /// Where the triangles of each mesh start in `leaves`, and their number at the end.
     pub(super) meshes: Vec<u32>,
     /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`].
@@ -49,10 +48,10 @@ pub struct LightSampler<const N: usize = 16, const M: usize = 4> {
 
 /// All lights of a scene in borrowed memory: plain data that can be mapped from a file or shared between processes.
 #[derive(Clone, Copy, Debug)]
-pub struct LightSamplerView<'a, const N: usize = 16, const M: usize = 4> {
+pub struct LightSamplerView<'a, const N: usize = 16> {
     pub(super) tlas: TlasView<'a, N>,
     pub(super) triangles: &'a [LightTriangle],
-    pub(super) cells: &'a [blas::Block<M>],
+    pub(super) cells: &'a [blas::Block],
     pub(super) meshes: &'a [u32],
     pub(super) leaves: &'a [u32],
     pub(super) scales: &'a [f32],
@@ -69,10 +68,10 @@ impl LightSampler {
     }
 }
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const N: usize> LightSampler<N> {
     /// The same lights in borrowed form.
     #[inline]
-    pub fn as_view(&self) -> LightSamplerView<'_, N, M> {
+    pub fn as_view(&self) -> LightSamplerView<'_, N> {
         LightSamplerView {
             tlas: self.tlas.view(),
             triangles: &self.triangles,
@@ -102,7 +101,7 @@ impl<const N: usize, const M: usize> LightSampler<N, M> {
     }
 }
 
-impl<'a, const N: usize, const M: usize> LightSamplerView<'a, N, M> {
+impl<'a, const N: usize> LightSamplerView<'a, N> {
     /// The environment, for its own sampling.
     pub fn environment(&self) -> EnvironmentView<'a> {
         self.environment

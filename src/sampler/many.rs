@@ -11,14 +11,14 @@ use crate::simd::prefetch;
 use crate::tlas::{TURNS, Walk};
 use crate::warp::Variate;
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const N: usize> LightSampler<N> {
     /// See [`LightSamplerView::sample_many`].
     pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
         self.as_view().sample_many(queries, samples);
     }
 }
 
-impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
+impl<const N: usize> LightSamplerView<'_, N> {
     /// Draws one sample for each shading point and its random numbers, the same as
     /// [`PointSampler::sample`] draws, but faster: a walk down a large tree mostly waits,
     /// and here several take turns.

@@ -7,7 +7,7 @@ use crate::light::Lit;
 use crate::record::{Hit, TriangleId};
 use crate::tlas::Splitting;
 
-impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+impl<const N: usize> PointSampler<'_, N> {
     /// Density per solid angle with which [`Self::sample`] draws this point of this triangle. Zero where it cannot;
     /// infinity nowhere.
     ///

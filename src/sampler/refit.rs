@@ -40,7 +40,7 @@ impl<'a> MeshUpdate<'a> {
     }
 }
 
-impl<const N: usize, const M: usize> LightSampler<N, M> {
+impl<const N: usize> LightSampler<N> {
     /// Applies changes of meshes without building anew. The tree keeps its shape and gets new bounds: sampling stays
     /// exact, but gets noisier the more lights have moved in relation to each other; [`Self::decay`] tells when a new
     /// build is worth its time. Takes time in proportion to all lights, however few have changed.

@@ -8,7 +8,7 @@ use crate::record::{Hit, LightSample};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
 
-impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+impl<const N: usize> PointSampler<'_, N> {
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first chooses the triangle, the other two the
     /// point on it, so that stratified pairs stay stratified.
     ///
@@ -97,12 +97,7 @@ pub(super) fn pdf_area(lit: &Lit<'_>, cell: &blas::Cell, cell_pmf: f64) -> f64 {
 }
 
 /// Density per solid angle, on a triangle that is chosen, of a given point.
-pub(super) fn follow<const M: usize>(
-    cells: &[blas::Block<M>],
-    root: blas::Root,
-    lit: &Lit<'_>,
-    place: Lattice,
-) -> Option<f64> {
+pub(super) fn follow(cells: &[blas::Block], root: blas::Root, lit: &Lit<'_>, place: Lattice) -> Option<f64> {
     let mut guide = blas::Follow::new(place);
     let (cell, cell_pmf) = blas::descend(cells, root, lit.vertices, lit, &mut guide)?;
     lit.per_solid_angle(pdf_area(lit, &cell, cell_pmf), lit.point(place))

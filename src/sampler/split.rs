@@ -9,7 +9,7 @@ use crate::record::{Hit, LightSample};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
 
-impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+impl<const N: usize> PointSampler<'_, N> {
     /// Draws one point from each part of the light tree that adaptive splitting visits (Conty Estevez and Kulla
     /// 2018), and one towards a sun if any is seen, and appends them to `samples`, which allocates only if they do not fit inline.
     ///

@@ -19,7 +19,7 @@ use crate::math;
 use crate::record::{Receiver, ShadingPoint};
 use crate::warp::Variate;
 
-impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
+impl<const N: usize> LightSamplerView<'_, N> {
     /// Whether suns may be seen through portals.
     #[inline]
     pub(super) fn has_suns(&self) -> bool {
@@ -110,7 +110,7 @@ impl<const N: usize, const M: usize> LightSamplerView<'_, N, M> {
     }
 }
 
-impl<const N: usize, const M: usize> PointSampler<'_, N, M> {
+impl<const N: usize> PointSampler<'_, N> {
     /// Draws a point on a portal towards a sun, by its place in the list.
     pub(super) fn sun_point(&self, index: usize, u: [Variate; 2]) -> Option<(u32, Lattice)> {
         let Seen { leaf, sun, part } = self.techniques.suns()?.seen(index);

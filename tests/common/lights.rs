@@ -22,7 +22,7 @@ pub(crate) trait Lights: Sync {
     fn sample_from_bytes(&self, points: &[(ShadingPoint, [f32; 3])]) -> Vec<Option<LightSample>>;
 }
 
-impl<const N: usize, const M: usize> Lights for LightSampler<N, M> {
+impl<const N: usize> Lights for LightSampler<N> {
     fn at<'a>(&'a self, x: &ShadingPoint) -> Box<dyn Point + 'a> {
         Box::new(LightSampler::at(self, x))
     }
@@ -67,7 +67,7 @@ impl<const N: usize, const M: usize> Lights for LightSampler<N, M> {
 
     fn sample_from_bytes(&self, points: &[(ShadingPoint, [f32; 3])]) -> Vec<Option<LightSample>> {
         let words = aligned(&self.to_bytes());
-        let view = LightSamplerView::<N, M>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+        let view = LightSamplerView::<N>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
         let mut samples = vec![None; points.len()];
         view.sample_many(points, &mut samples);
         samples
@@ -83,7 +83,7 @@ pub(crate) trait Point {
     fn pdf_sample_direction(&self, sample: &LightSample) -> f32;
 }
 
-impl<const N: usize, const M: usize> Point for PointSampler<'_, N, M> {
+impl<const N: usize> Point for PointSampler<'_, N> {
     fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
         PointSampler::sample(self, u)
     }
@@ -117,9 +117,9 @@ pub(crate) const ARITIES: [(usize, usize); 3] = [(8, 4), (4, 4), (16, 4)];
 /// A sampler of these arities.
 pub(crate) fn build(scene: &Scene, arities: (usize, usize)) -> Box<dyn Lights> {
     match arities {
-        (4, 4) => Box::new(scene.build::<4, 4>()),
-        (8, 4) => Box::new(scene.build::<8, 4>()),
-        (16, 4) => Box::new(scene.build::<16, 4>()),
+        (4, 4) => Box::new(scene.build::<4>()),
+        (8, 4) => Box::new(scene.build::<8>()),
+        (16, 4) => Box::new(scene.build::<16>()),
         _ => unreachable!("no such arities are tested"),
     }
 }

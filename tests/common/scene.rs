@@ -220,8 +220,8 @@ impl Scene {
         environment.and_then(|e| e.with_rotation(self.rotation)).expect("the environment is valid")
     }
 
-    pub(crate) fn build<const N: usize, const M: usize>(&self) -> LightSampler<N, M> {
-        let mut builder = LightSamplerBuilder::<N, M>::new();
+    pub(crate) fn build<const N: usize>(&self) -> LightSampler<N> {
+        let mut builder = LightSamplerBuilder::<N>::new();
         builder.environment(self.environment()).illumination(self.illumination);
         let textures: Vec<_> = self.images.iter().map(|image| builder.add_texture(image.texture())).collect();
         for light in &self.meshes {

@@ -7,20 +7,20 @@ fn talk_index(local: [u32; 3], size: u32, r: u32) -> usize {
     (beta[0] * beta[0] + (beta[1] - beta[2]) + beta[0]) as usize
 }
 
-fn numbering<const M: usize>() {
-    let r = edge_cells::<M>();
+fn numbering() {
+    let r = EDGE_CELLS;
     let size = 16 * r;
     let t = size / r;
     let parent = Cell { offset: [0; 3], inverted: false, size };
-    let mut inside = [0u32; M];
+    let mut inside = [0u32; ARITY];
     for j1 in 0..=size {
         for j2 in 0..=size - j1 {
             let local = [size - j1 - j2, j1, j2];
-            let (index, inner) = child::<M>(local, size);
-            assert!(index < M);
+            let (index, inner) = child(local, size);
+            assert!(index < ARITY);
             assert_eq!(inner.iter().sum::<u32>(), t, "{local:?}");
             // The way back arrives at the same point, so the index is that of a cell which holds it.
-            assert_eq!(parent.child::<M>(index).global(inner).0, local);
+            assert_eq!(parent.child(index).global(inner).0, local);
             if inner.iter().all(|&j| j > 0) {
                 inside[index] += 1;
                 assert_eq!(index, talk_index(local, size, r), "{local:?}");
@@ -28,34 +28,32 @@ fn numbering<const M: usize>() {
         }
     }
     // Every cell has all of its interior points: (t - 1)(t - 2) / 2 of them.
-    assert_eq!(inside, [(t - 1) * (t - 2) / 2; M]);
+    assert_eq!(inside, [(t - 1) * (t - 2) / 2; ARITY]);
 }
 
 #[test]
 fn numbering_is_consistent_on_a_small_lattice() {
-    numbering::<4>();
-    numbering::<16>();
-    numbering::<64>();
+    numbering();
 }
 
 #[test]
 fn numbering_of_four_is_corners_and_middle() {
-    assert_eq!(child::<4>([16, 0, 0], 16), (0, [8, 0, 0]));
-    assert_eq!(child::<4>([0, 16, 0], 16), (1, [0, 8, 0]));
-    assert_eq!(child::<4>([0, 0, 16], 16), (3, [0, 0, 8]));
-    assert_eq!(child::<4>([6, 5, 5], 16).0, 2);
+    assert_eq!(child([16, 0, 0], 16), (0, [8, 0, 0]));
+    assert_eq!(child([0, 16, 0], 16), (1, [0, 8, 0]));
+    assert_eq!(child([0, 0, 16], 16), (3, [0, 0, 8]));
+    assert_eq!(child([6, 5, 5], 16).0, 2);
 }
 
 /// Down a random path of cells, a point strictly inside of the last cell is looked up along the same path.
-fn paths<const M: usize>(seed: u64) {
+fn paths(seed: u64) {
     let mut rng = Pcg32::new(seed, 3);
-    let levels = MAX_DEPTH / level_halvings::<M>();
+    let levels = MAX_DEPTH / LEVEL_HALVINGS;
     for _ in 0..2000 {
         let mut cell = Cell::root();
         let mut path = [0; MAX_DEPTH as usize];
         for index in &mut path[..levels as usize] {
-            *index = rng.below(M as u32) as usize;
-            cell = cell.child::<M>(*index);
+            *index = rng.below(ARITY as u32) as usize;
+            cell = cell.child(*index);
         }
         assert!(cell.size >= 16);
         let inner = interior_point(cell.size, [f64::from(rng.next_f32()), f64::from(rng.next_f32())]);
@@ -65,9 +63,9 @@ fn paths<const M: usize>(seed: u64) {
         assert_eq!(Lattice::from_barycentrics(point.to_barycentrics()), point);
         let (mut local, mut size) = (point.0, LATTICE);
         for &index in &path[..levels as usize] {
-            let (found, next) = child::<M>(local, size);
+            let (found, next) = child(local, size);
             assert_eq!(found, index);
-            (local, size) = (next, size >> level_halvings::<M>());
+            (local, size) = (next, size >> LEVEL_HALVINGS);
         }
         assert_eq!(local, inner);
         for (corner, b) in cell.corners().into_iter().zip(cell.corner_barycentrics()) {
@@ -79,13 +77,11 @@ fn paths<const M: usize>(seed: u64) {
 
 #[test]
 fn paths_are_found_again() {
-    paths::<4>(1);
-    paths::<16>(2);
-    paths::<64>(3);
+    paths(1);
 }
 
 /// Any point, edges and corners included, is in a cell at every depth, and in one that really holds it.
-fn everywhere<const M: usize>() {
+fn everywhere() {
     let mut rng = Pcg32::new(9, 1);
     let mut points = alloc::vec![[LATTICE, 0, 0], [0, LATTICE, 0], [0, 0, LATTICE]];
     for _ in 0..2000 {
@@ -97,9 +93,9 @@ fn everywhere<const M: usize>() {
     }
     for point in points {
         let (mut local, mut cell) = (point, Cell::root());
-        for _ in 0..MAX_DEPTH / level_halvings::<M>() {
-            let (index, next) = child::<M>(local, cell.size);
-            cell = cell.child::<M>(index);
+        for _ in 0..MAX_DEPTH / LEVEL_HALVINGS {
+            let (index, next) = child(local, cell.size);
+            cell = cell.child(index);
             local = next;
             assert_eq!(cell.global(local).0, point);
         }
@@ -108,9 +104,7 @@ fn everywhere<const M: usize>() {
 
 #[test]
 fn every_point_has_a_cell() {
-    everywhere::<4>();
-    everywhere::<16>();
-    everywhere::<64>();
+    everywhere();
 }
 
 #[test]
@@ -147,7 +141,7 @@ fn interior_points_are_uniform() {
         for j in 0..n {
             let u = [(f64::from(i) + 0.5) / f64::from(n), (f64::from(j) + 0.5) / f64::from(n)];
             let p = interior_point(size, u);
-            quarters[child::<4>(p, size).0] += 1;
+            quarters[child(p, size).0] += 1;
             mean = core::array::from_fn(|k| mean[k] + f64::from(p[k]));
         }
     }
@@ -163,8 +157,8 @@ fn interior_points_are_uniform() {
 #[test]
 fn cells_hold_the_points_strictly_inside() {
     let parent = Cell { offset: [0; 3], inverted: false, size: 32 };
-    for index in 0..16 {
-        let cell = parent.child::<16>(index);
+    for index in 0..ARITY {
+        let cell = parent.child(index);
         let mut held = 0;
         for j1 in 0..=32 {
             for j2 in 0..=32 - j1 {
@@ -172,14 +166,14 @@ fn cells_hold_the_points_strictly_inside() {
                 let local = cell.local(point);
                 let is_inside = local.iter().all(|&j| j > 0);
                 assert_eq!(cell.holds(point), is_inside);
-                assert_eq!(local.iter().sum::<i32>(), 8);
+                assert_eq!(local.iter().sum::<i32>(), 16);
                 if is_inside {
                     held += 1;
                     assert_eq!(cell.global(local.map(|j| j as u32)), point);
-                    assert_eq!(child::<16>(point.0, 32).0, index);
+                    assert_eq!(child(point.0, 32).0, index);
                 }
             }
         }
-        assert_eq!(held, 7 * 6 / 2);
+        assert_eq!(held, 15 * 14 / 2);
     }
 }

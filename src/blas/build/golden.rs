@@ -16,7 +16,7 @@ fn quad() -> [[Vec2; 3]; 2] {
 fn golden() {
     let texels = spots(64);
     let mut prepared = Prepared::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
-    let mut pool = Vec::<Block<4>>::new();
+    let mut pool = Vec::<Block>::new();
     let roots = quad().map(|uv| build(&mut prepared, uv, &mut pool).unwrap());
     // FNV-1a.
     let hash = |bytes: &[u8]| {

@@ -25,13 +25,13 @@ impl Shape for Halved {
         Worth { weight, uniform: cell.domain.size <= self.smallest, even: true }
     }
 
-    fn worths<const M: usize>(&self, cell: &Cell, _texture: &Parts<'_, M>, _even: bool) -> Worths<M> {
+    fn worths(&self, cell: &Cell, _texture: &Parts<'_>, _even: bool) -> Worths {
         one_by_one(self, cell)
     }
 }
 
-fn one_by_one<const M: usize>(shape: &impl Shape, cell: &Cell) -> Worths<M> {
-    let worths: [Worth; M] = core::array::from_fn(|i| shape.worth(&cell.child::<M>(i)));
+fn one_by_one(shape: &impl Shape, cell: &Cell) -> Worths {
+    let worths: [Worth; ARITY] = core::array::from_fn(|i| shape.worth(&cell.child(i)));
     Worths { weights: worths.map(|w| w.weight), uniform: worths.map(|w| w.uniform), even: worths.map(|w| w.even) }
 }
 
@@ -43,7 +43,7 @@ struct Scripted<'a> {
 }
 
 impl Guide for Scripted<'_> {
-    fn choose<const M: usize>(&mut self, weights: &[f32; M]) -> usize {
+    fn choose(&mut self, weights: &[f32; ARITY]) -> usize {
         let index = match self.script.get(self.at) {
             Some(&index) => index,
             None => {
@@ -57,7 +57,7 @@ impl Guide for Scripted<'_> {
 }
 
 /// Probability of all leaves, and of all dead ends.
-fn masses<const M: usize>(nodes: &[Block<M>], root: Root, shape: &Halved) -> (f64, f64) {
+fn masses(nodes: &[Block], root: Root, shape: &Halved) -> (f64, f64) {
     let vertices = [Vec3::new(-1.0, 0.0, 1.0), Vec3::new(1.0, 0.5, 1.5), Vec3::new(0.5, 1.0, 0.75)];
     let (mut leaves, mut dead) = (0.0, 0.0);
     let mut open = Vec::from([(Vec::new(), 1.0)]);
@@ -83,7 +83,7 @@ fn masses<const M: usize>(nodes: &[Block<M>], root: Root, shape: &Halved) -> (f6
     (leaves, dead)
 }
 
-fn tree<const M: usize>(pcg: &mut Pcg32) -> (Vec<Block<M>>, Root) {
+fn tree(pcg: &mut Pcg32) -> (Vec<Block>, Root) {
     let texels: Vec<f32> = (0..16 * 16).map(|_| if pcg.next_f32() < 0.2 { pcg.next_f32() } else { 0.0 }).collect();
     let texture = Texture::new(16, 16, &texels).expect("texels are finite").filter(Filter::Nearest);
     let mut nodes = Vec::new();
@@ -92,8 +92,8 @@ fn tree<const M: usize>(pcg: &mut Pcg32) -> (Vec<Block<M>>, Root) {
     (nodes, root)
 }
 
-fn all_ways_have_all_the_probability<const M: usize>() {
-    let (nodes, root) = tree::<M>(&mut Pcg32::new(1, 2));
+fn all_ways_have_all_the_probability() {
+    let (nodes, root) = tree(&mut Pcg32::new(1, 2));
     for smallest in [barycentric::LATTICE, barycentric::LATTICE >> 6] {
         let (leaves, dead) = masses(&nodes, root, &Halved { smallest });
         assert!((leaves + dead - 1.0).abs() < 1e-9 && leaves > 0.5, "{leaves} + {dead}");
@@ -102,14 +102,12 @@ fn all_ways_have_all_the_probability<const M: usize>() {
 
 #[test]
 fn leaves_and_dead_ends_have_all_the_probability() {
-    all_ways_have_all_the_probability::<4>();
-    all_ways_have_all_the_probability::<16>();
-    all_ways_have_all_the_probability::<64>();
+    all_ways_have_all_the_probability();
 }
 
-fn a_drawn_point_leads_back<const M: usize>() {
+fn a_drawn_point_leads_back() {
     let mut pcg = Pcg32::new(2, 2);
-    let (nodes, root) = tree::<M>(&mut pcg);
+    let (nodes, root) = tree(&mut pcg);
     let vertices = [Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.5, 1.5), Vec3::new(0.5, 1.0, 0.75)];
     let shape = Halved { smallest: 16 };
     for i in 0..20_000 {
@@ -128,9 +126,7 @@ fn a_drawn_point_leads_back<const M: usize>() {
 
 #[test]
 fn the_way_back_from_a_drawn_point_is_the_same() {
-    a_drawn_point_leads_back::<4>();
-    a_drawn_point_leads_back::<16>();
-    a_drawn_point_leads_back::<64>();
+    a_drawn_point_leads_back();
 }
 
 /// As many points of a grid as there are cells of a uniform tree: each cell gets one.
@@ -142,7 +138,7 @@ fn stratified_input_stays_stratified() {
             Worth { weight: 1.0, uniform: cell.domain.size <= barycentric::LATTICE >> 6, even: true }
         }
 
-        fn worths<const M: usize>(&self, cell: &Cell, _texture: &Parts<'_, M>, _even: bool) -> Worths<M> {
+        fn worths(&self, cell: &Cell, _texture: &Parts<'_>, _even: bool) -> Worths {
             one_by_one(self, cell)
         }
     }
@@ -151,7 +147,7 @@ fn stratified_input_stays_stratified() {
     for i in 0..64 * 64 {
         let u = [i % 64, i / 64].map(|x| (x as f32 + 0.5) / 64.0);
         let mut draw = Draw::new([Variate::new(u[0], 0), Variate::new(u[1], 1)]);
-        let (cell, _) = descend::<4>(&[], Root::constant(1.0), vertices, &Uniform, &mut draw).expect("nothing is dark");
+        let (cell, _) = descend(&[], Root::constant(1.0), vertices, &Uniform, &mut draw).expect("nothing is dark");
         cells.insert((cell.domain.offset, cell.domain.inverted));
     }
     assert_eq!(cells.len(), 64 * 64);

@@ -48,7 +48,7 @@ pub(crate) fn bytes(data: &[u8]) {
     let start = padded.as_ptr().align_offset(4);
     let aligned = &mut padded[start..start + bytes.len()];
     aligned.copy_from_slice(&bytes);
-    let Ok(view) = LightSamplerView::<16, 4>::from_bytes(aligned) else { return };
+    let Ok(view) = LightSamplerView::<16>::from_bytes(aligned) else { return };
     for _ in 0..4 {
         sample(&view, &mut reader);
     }
