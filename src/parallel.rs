@@ -75,3 +75,20 @@ pub(crate) fn for_each<T: Send>(elements: &mut [T], size: usize, work: impl Fn(&
 pub(crate) fn for_each<T>(elements: &mut [T], _size: usize, work: impl Fn(&mut T)) {
     elements.iter_mut().for_each(work);
 }
+
+/// Maps all items, side by side if they are `threshold` or more. Each one is mapped alone and their order stays: the
+/// first failure in this order is the one that is returned.
+#[cfg_attr(not(feature = "rayon"), expect(unused_variables, reason = "one thread needs no threshold"))]
+pub(crate) fn map<T: Sync, R: Send, F: Send>(
+    items: &[T],
+    threshold: usize,
+    map: impl Fn(&T) -> Result<R, F> + Sync + Send,
+) -> Result<Vec<R>, F> {
+    #[cfg(feature = "rayon")]
+    if items.len() >= threshold {
+        use rayon::prelude::*;
+        let mapped: Vec<Result<R, F>> = items.par_iter().map(map).collect();
+        return mapped.into_iter().collect();
+    }
+    items.iter().map(map).collect()
+}

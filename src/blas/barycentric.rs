@@ -1,7 +1,7 @@
 //! Barycentric coordinates as integers, and the numbering of a node's cells.
 //!
 //! A point is three integers `(i0, i1, i2)` that sum to `2^24`, so that `b1 = i1 · 2^-24` and `b2 = i2 · 2^-24` are
-//! exact in an `f32`, and so is every step of a descent: a point is drawn in the cell that a look-up of the same
+//! exact in an `f32`, and so is every step of a descent: a point is drawn in the cell that a lookup of the same
 //! point finds, at every depth, on edges and corners too.
 //!
 //! The numbering is Ogaki's: with [`ARITY`] `M`, `R = √M` and `βk = min(R - 1, ⌊(1 - bk) R⌋)`, the index is
@@ -98,7 +98,7 @@ pub(crate) fn child(local: [u32; 3], size: u32) -> (usize, [u32; 3]) {
 
 /// Where the cell of an index lies: its row, column and orientation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct CellPosition {
     /// The lowest coordinate along each of the three axes, in cells.
     pub(crate) a: [u32; 3],
     /// Whether the cell is turned by half a circle.
@@ -107,7 +107,7 @@ pub(crate) struct Place {
 
 /// The inverse of the numbering. `index` is below [`ARITY`].
 #[inline]
-pub(crate) const fn place(index: usize) -> Place {
+pub(crate) const fn position(index: usize) -> CellPosition {
     let r = EDGE_CELLS;
     debug_assert!(index < ARITY);
     let index = index as u32;
@@ -115,12 +115,12 @@ pub(crate) const fn place(index: usize) -> Place {
     let column = index - row * row;
     let a2 = column / 2;
     let inverted = column % 2 == 1;
-    Place { a: [r - 1 - row, row - a2 - column % 2, a2], inverted }
+    CellPosition { a: [r - 1 - row, row - a2 - column % 2, a2], inverted }
 }
 
 /// A cell of any depth: how its own coordinates map to those of the whole triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Cell {
+pub(crate) struct LatticeCell {
     /// The point from which coordinates count, up or (inverted) down.
     pub(crate) offset: [i32; 3],
     /// Whether the cell is turned by half a circle against the whole triangle.
@@ -129,17 +129,17 @@ pub(crate) struct Cell {
     pub(crate) size: u32,
 }
 
-impl Cell {
+impl LatticeCell {
     /// The whole triangle.
     #[inline]
-    pub(crate) const fn root() -> Self {
+    pub(crate) const fn whole() -> Self {
         Self { offset: [0; 3], inverted: false, size: LATTICE }
     }
 
     /// One of the cells of this one. `index` is below [`ARITY`].
     #[inline]
     pub(crate) fn child(self, index: usize) -> Self {
-        let Place { a, inverted } = place(index);
+        let CellPosition { a, inverted } = position(index);
         let size = self.size >> LEVEL_HALVINGS;
         let mut offset = self.offset;
         for (o, a) in offset.iter_mut().zip(a) {
@@ -158,6 +158,13 @@ impl Cell {
             (self.offset[k] + if self.inverted { -step } else { step }) as u32
         };
         Lattice([along(0), along(1), along(2)])
+    }
+
+    /// Share of the whole triangle's area.
+    #[inline]
+    pub(crate) fn area(self) -> f32 {
+        let edge = self.size as f32 / LATTICE as f32;
+        edge * edge
     }
 
     /// The cell's corners, in the order of its own vertices.

@@ -14,6 +14,15 @@ use crate::blas::code::{LARGEST, decode, encode};
 /// Stands for "no node below": the weight is taken for constant over the cell.
 pub(crate) const LEAF: u32 = u32::MAX;
 
+/// The largest average that is stored. *Proved*: larger ones only steer sampling, and a sum of 2^26 of them stays below
+/// the largest `f32`.
+pub(crate) const MAX_AVERAGE: f32 = 1e30;
+
+/// Narrows to what nodes hold: zero, or a normal `f32` up to [`MAX_AVERAGE`].
+pub(crate) fn storable(value: f64) -> f32 {
+    if value > 0.0 { (value as f32).clamp(f32::MIN_POSITIVE, MAX_AVERAGE) } else { 0.0 }
+}
+
 /// Cells of a block. A tree starts at the first cell of one.
 pub(crate) const CELLS: usize = 32;
 
@@ -23,11 +32,11 @@ pub(crate) const CELLS: usize = 32;
 /// others are the [codes](crate::blas::code) of the average weights over the cells.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub(crate) struct Block([u32; 2 + CELLS / 4]);
+pub(crate) struct CellBlock([u32; 2 + CELLS / 4]);
 
-const _: () = assert!(size_of::<Block>() == 40 && CELLS % ARITY == 0);
+const _: () = assert!(size_of::<CellBlock>() == 40 && CELLS % ARITY == 0);
 
-impl Block {
+impl CellBlock {
     #[inline(always)]
     fn codes(&self) -> &[u8; CELLS] {
         let bytes: &[u8; 8 + CELLS] = bytemuck::cast_ref(&self.0);
@@ -41,9 +50,9 @@ impl Block {
     }
 }
 
-/// Relative average weights over the cells of a node. Positive wherever any look-up in the cell is.
+/// Relative average weights over the cells of a node. Positive wherever any lookup in the cell is.
 #[inline(always)]
-pub(crate) fn averages(blocks: &[Block], node: u32) -> [f32; ARITY] {
+pub(crate) fn averages(blocks: &[CellBlock], node: u32) -> [f32; ARITY] {
     let first = node as usize * ARITY;
     let codes = &blocks[first / CELLS].codes()[first % CELLS..][..ARITY];
     core::array::from_fn(|i| decode(codes[i]))
@@ -51,7 +60,7 @@ pub(crate) fn averages(blocks: &[Block], node: u32) -> [f32; ARITY] {
 
 /// The node below a cell of a node, or [`LEAF`].
 #[inline(always)]
-pub(crate) fn below(blocks: &[Block], node: u32, cell: usize) -> u32 {
+pub(crate) fn below(blocks: &[CellBlock], node: u32, cell: usize) -> u32 {
     let at = node as usize * ARITY + cell;
     let [divided, first, ..] = blocks[at / CELLS].0;
     let bit = 1 << (at % CELLS);
@@ -60,7 +69,7 @@ pub(crate) fn below(blocks: &[Block], node: u32, cell: usize) -> u32 {
 
 /// Mean of a node's relative averages.
 #[inline]
-pub(crate) fn mean(blocks: &[Block], node: u32) -> f32 {
+pub(crate) fn mean(blocks: &[CellBlock], node: u32) -> f32 {
     averages(blocks, node).iter().sum::<f32>() / ARITY as f32
 }
 
@@ -85,12 +94,12 @@ impl Root {
 /// order of the nodes. Returns the number of its first node.
 ///
 /// The caller has made sure with [`end`] that numbers suffice.
-pub(crate) fn append(blocks: &mut Vec<Block>, averages: &[f32], divided: &[bool]) -> u32 {
+pub(crate) fn append(blocks: &mut Vec<CellBlock>, averages: &[f32], divided: &[bool]) -> u32 {
     let root = first_free(blocks);
     let largest = averages.iter().fold(f32::MIN_POSITIVE, |largest, average| largest.max(*average));
     let mut next = root + 1;
     for (averages, divided) in averages.chunks(CELLS).zip(divided.chunks(CELLS)) {
-        let mut block = Block([0; 2 + CELLS / 4]);
+        let mut block = CellBlock([0; 2 + CELLS / 4]);
         block.0[1] = next;
         for (cell, (average, divided)) in averages.iter().zip(divided).enumerate() {
             let code = encode(average / largest * LARGEST);
@@ -104,16 +113,16 @@ pub(crate) fn append(blocks: &mut Vec<Block>, averages: &[f32], divided: &[bool]
 }
 
 /// The number that the next tree's first node gets.
-fn first_free(blocks: &[Block]) -> u32 {
+fn first_free(blocks: &[CellBlock]) -> u32 {
     (blocks.len() * CELLS / ARITY) as u32
 }
 
 /// The number of nodes in the pool after a tree of `nodes` was appended.
-pub(crate) fn end(blocks: &[Block], nodes: usize) -> usize {
+pub(crate) fn end(blocks: &[CellBlock], nodes: usize) -> usize {
     blocks.len() * CELLS / ARITY + nodes
 }
 
 /// Whether the tree of a root, if there is one, starts in this part of a pool.
-pub(crate) fn holds(blocks: &[Block], root: Root) -> bool {
+pub(crate) fn holds(blocks: &[CellBlock], root: Root) -> bool {
     root.node == LEAF || (root.node as usize) < end(blocks, 0)
 }

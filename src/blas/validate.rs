@@ -3,22 +3,21 @@
 use alloc::vec;
 
 use crate::blas::barycentric::{ARITY, LEVEL_HALVINGS, MAX_DEPTH};
-use crate::blas::coverage::MAX_AVERAGE;
-use crate::blas::node::{Block, CELLS, LEAF, Root, averages, below};
+use crate::blas::node::{CELLS, CellBlock, LEAF, MAX_AVERAGE, Root, averages, below};
 use crate::error::Error;
 
 /// Number of nodes that a pool has place for.
-fn node_count(blocks: &[Block]) -> usize {
+fn node_count(blocks: &[CellBlock]) -> usize {
     blocks.len() * CELLS / ARITY
 }
 
-fn is_lit(blocks: &[Block], node: u32) -> bool {
+fn is_lit(blocks: &[CellBlock], node: u32) -> bool {
     averages(blocks, node).iter().any(|average| *average > 0.0)
 }
 
 /// Checks a pool: afterwards every descent from any node ends, stays in bounds, and finds a positive cell below every
 /// positive cell.
-pub(crate) fn validate(blocks: &[Block]) -> Result<(), Error> {
+pub(crate) fn validate(blocks: &[CellBlock]) -> Result<(), Error> {
     let count = node_count(blocks);
     if count >= LEAF as usize {
         return Err(Error::bytes("number of nodes", 0, count, LEAF - 1));
@@ -54,13 +53,13 @@ pub(crate) fn validate(blocks: &[Block]) -> Result<(), Error> {
     Ok(())
 }
 
-fn is_divided(blocks: &[Block], node: u32, cell: usize) -> bool {
+fn is_divided(blocks: &[CellBlock], node: u32, cell: usize) -> bool {
     let at = node as usize * ARITY + cell;
     blocks[at / CELLS].divided() >> (at % CELLS) & 1 == 1
 }
 
 /// Checks the roots into a pool that [`validate`] has passed.
-pub(crate) fn validate_roots(roots: &[Root], blocks: &[Block]) -> Result<(), Error> {
+pub(crate) fn validate_roots(roots: &[Root], blocks: &[CellBlock]) -> Result<(), Error> {
     let count = node_count(blocks);
     for (i, root) in roots.iter().enumerate() {
         // NaN fails.
@@ -87,7 +86,7 @@ mod tests {
     use alloc::vec::Vec;
 
     /// Each node but the last has one below its cell 2.
-    fn chain(n: usize) -> Vec<Block> {
+    fn chain(n: usize) -> Vec<CellBlock> {
         let averages: Vec<f32> = (0..4 * n).map(|i| if i % 4 == 2 { 1.0 } else { 0.0 }).collect();
         let divided: Vec<bool> = (0..4 * n).map(|i| i % 4 == 2 && i + 4 < 4 * n).collect();
         let mut blocks = Vec::new();
@@ -96,7 +95,7 @@ mod tests {
     }
 
     /// The same with one byte changed.
-    fn changed(n: usize, at: usize, value: u8) -> Vec<Block> {
+    fn changed(n: usize, at: usize, value: u8) -> Vec<CellBlock> {
         let mut blocks = chain(n);
         bytemuck::cast_slice_mut(&mut blocks)[at] = value;
         blocks

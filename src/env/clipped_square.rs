@@ -1,5 +1,6 @@
-//! What lines leave over of a square. In single precision, for shading points; building has its own polygons.
+//! What lines leave over of a square, in single precision.
 
+use crate::geometry::Polygon;
 use crate::warp::triangle::square_to_triangle;
 use crate::warp::{Variate, pick, sum};
 
@@ -8,57 +9,26 @@ const CAPACITY: usize = 8;
 
 /// The convex rest of a square.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ClippedSquare {
-    vertices: [[f32; 2]; CAPACITY],
-    len: usize,
-}
+pub(super) struct ClippedSquare(Polygon<f32, CAPACITY>);
 
 impl ClippedSquare {
     /// The square of unit side around the origin.
     pub(super) fn whole() -> Self {
-        let mut vertices = [[0.0; 2]; CAPACITY];
-        vertices[..4].copy_from_slice(&[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]);
-        Self { vertices, len: 4 }
+        Self(Polygon::new([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]))
     }
 
-    /// The part where `c + s x + t y` is not negative (Sutherland and Hodgman 1974).
+    /// The part where `c + s x + t y` is not negative.
     #[inline]
     pub(super) fn clip(&self, [c, s, t]: [f32; 3]) -> Self {
-        let mut out = Self { vertices: [[0.0; 2]; CAPACITY], len: 0 };
-        let side = |[x, y]: [f32; 2]| c + s * x + t * y;
-        let vertices = &self.vertices[..self.len];
-        let Some(&last) = vertices.last() else { return out };
-        let (mut a, mut da) = (last, side(last));
-        for &b in vertices {
-            let db = side(b);
-            if (da < 0.0) != (db < 0.0) {
-                let k = da / (da - db);
-                out.push([a[0] + k * (b[0] - a[0]), a[1] + k * (b[1] - a[1])]);
-            }
-            if db >= 0.0 {
-                out.push(b);
-            }
-            (a, da) = (b, db);
-        }
-        out
-    }
-
-    #[inline]
-    fn push(&mut self, vertex: [f32; 2]) {
-        if self.len < CAPACITY {
-            self.vertices[self.len] = vertex;
-            self.len += 1;
-        }
+        Self(self.0.clip(|[x, y]| c + s * x + t * y))
     }
 
     /// Areas of the triangles of the fan around the first vertex.
     #[inline]
     fn fan(&self) -> [f32; CAPACITY - 2] {
-        let [x, y] = self.vertices[0];
         let mut areas = [0.0; CAPACITY - 2];
-        for (area, i) in areas.iter_mut().zip(2..self.len) {
-            let ([bx, by], [cx, cy]) = (self.vertices[i - 1], self.vertices[i]);
-            *area = (0.5 * ((bx - x) * (cy - y) - (by - y) * (cx - x))).max(0.0);
+        for (area, (_, double)) in areas.iter_mut().zip(self.0.fan()) {
+            *area = (0.5 * double).max(0.0);
         }
         areas
     }
@@ -72,7 +42,8 @@ impl ClippedSquare {
     /// Whether a point lies inside, or outside by no more than so much.
     #[cfg(test)]
     pub(super) fn holds(&self, [x, y]: [f32; 2], slack: f32) -> bool {
-        let edges = (0..self.len).map(|i| (self.vertices[i], self.vertices[(i + 1) % self.len]));
+        let vertices = self.0.vertices();
+        let edges = (0..vertices.len()).map(|i| (vertices[i], vertices[(i + 1) % vertices.len()]));
         let left = |(a, b): ([f32; 2], [f32; 2])| {
             let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
             dx * (y - a[1]) - dy * (x - a[0]) >= -slack * (dx * dx + dy * dy).sqrt()
@@ -85,7 +56,7 @@ impl ClippedSquare {
         let areas = self.fan();
         let chosen = pick(&areas, sum(&areas), &mut u[0]);
         let [b1, b2] = square_to_triangle(u.map(|u| u.value())).map(|b| b as f32);
-        let [[x, y], b, c] = [self.vertices[0], self.vertices[chosen + 1], self.vertices[chosen + 2]];
+        let [[x, y], b, c] = self.0.fan_triangle(chosen);
         [x + b1 * (b[0] - x) + b2 * (c[0] - x), y + b1 * (b[1] - y) + b2 * (c[1] - y)]
     }
 }

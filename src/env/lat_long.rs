@@ -9,14 +9,17 @@
 //! Coordinates here are `[r, b]` with b = r f, a shear of the octant's triangle that keeps areas: a parallel is
 //! `r = R`, a meridian is `b = F r`.
 
-use super::polygon::Polygon;
 use super::source::Source;
+use crate::geometry;
 use crate::math::cos64;
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, SQRT_2};
 
 /// Share of a texel below which a polygon is taken for a rounding error of a shared edge.
 const SLIVER: f64 = 1e-12;
+
+/// A texel or a part of one. A square that is cut twice along each of two lines has at most 8 vertices.
+type Polygon = geometry::Polygon<f64, 12>;
 
 /// A latitude-longitude source, ready to be averaged over texels.
 pub(super) struct LatLong<'a> {
@@ -88,7 +91,7 @@ impl<'a> LatLong<'a> {
 
     /// Cuts a polygon of one octant along the parallels.
     fn add_octant(&self, polygon: Polygon, octant: Octant, sliver: f64, sums: &mut Sums) {
-        let (low, high) = range(polygon.points().iter().map(|p| p[0]));
+        let (low, high) = range(polygon.vertices().iter().map(|p| p[0]));
         let mut rest = polygon;
         let mut row = self.radii.partition_point(|&r| r <= low).min(self.radii.len() - 1);
         while row + 1 < self.radii.len() && self.radii[row] < high {
@@ -103,12 +106,12 @@ impl<'a> LatLong<'a> {
 
     /// Cuts a polygon of one row along the meridians.
     fn add_row(&self, polygon: Polygon, row: usize, octant: Octant, sliver: f64, sums: &mut Sums) {
-        if polygon.area() <= sliver {
+        if area(&polygon) <= sliver {
             return;
         }
         let row = if octant.lower { self.rows - 1 - row } else { row };
         // The pole belongs to all meridians: the other vertices tell which ones.
-        let (low, high) = range(polygon.points().iter().filter(|p| p[0] > 0.0).map(|p| p[1] / p[0]));
+        let (low, high) = range(polygon.vertices().iter().filter(|p| p[0] > 0.0).map(|p| p[1] / p[0]));
         let per_column = 4.0 / self.columns as f64;
         let mut rest = polygon;
         let mut column = (((octant.base + low) / per_column) as usize).min(self.columns - 1);
@@ -122,11 +125,11 @@ impl<'a> LatLong<'a> {
                 rest = further;
                 part
             };
-            let area = part.area();
-            if area > sliver {
+            let shared = area(&part);
+            if shared > sliver {
                 let column = if octant.mirrored { self.columns - 1 - column } else { column };
-                sums.flux += area * self.source.cell(column, row);
-                sums.area += area;
+                sums.flux += shared * self.source.cell(column, row);
+                sums.area += shared;
             }
             if last {
                 return;
@@ -134,6 +137,11 @@ impl<'a> LatLong<'a> {
             column += 1;
         }
     }
+}
+
+/// Returns the area of a polygon in either sense of rotation.
+fn area(polygon: &Polygon) -> f64 {
+    0.5 * polygon.fan().map(|(_, double)| double).sum::<f64>().abs()
 }
 
 /// Smallest and largest of some numbers.

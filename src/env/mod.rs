@@ -13,7 +13,6 @@ mod footprint;
 mod lat_long;
 mod opening;
 mod parts;
-mod polygon;
 mod pyramid;
 mod resample;
 mod rotation;

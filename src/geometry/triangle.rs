@@ -69,6 +69,18 @@ pub(crate) fn intersect(vertices: [DVec3; 3], direction: Vec3) -> Option<[f32; 2
     (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0).then_some([b1 as f32, b2 as f32])
 }
 
+/// Returns the barycentrics `[b1, b2]` of the centers of the `n²` congruent triangles that a triangle is divided into.
+pub(crate) fn subdivision_centers(n: u32) -> impl Iterator<Item = [f64; 2]> {
+    let center = move |i: u32| f64::from(i) / f64::from(3 * n);
+    (0..n).flat_map(move |i| {
+        (0..n - i).flat_map(move |j| {
+            // The last of a row has no inverted one beside it.
+            let thirds = if i + j == n - 1 { 1 } else { 2 };
+            (1..=thirds).map(move |third| [center(3 * i + third), center(3 * j + third)])
+        })
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::illumination::Views;
 use super::triangle::Lit;
-use crate::blas::{self, ARITY, Cell, Parts, Shape, Worth, Worths};
+use crate::blas::{self, ARITY, CellTarget, CellWeight, CellWeights, LatticeCell, TextureChildren};
 use crate::env::Footprint;
 
 /// Ratio of squared radius to squared distance up to which the geometry is taken for the same all over a cell.
@@ -20,22 +20,22 @@ const EVEN_COSINE: f32 = 0.5;
 const LOW_COSINE: f32 = 1.0 / 16.0;
 
 impl Lit<'_> {
-    /// Whether the receiver's cosine is about the same all over a cell, given the heights of its corners over the
+    /// Whether the receiver's cosine is nearly constant over a cell, given the heights of its corners over the
     /// receiver's plane, or too small to matter.
     #[inline(always)]
-    fn is_evenly_lifted(&self, [a, b, c]: [f32; 3]) -> bool {
+    fn has_constant_cosine(&self, [a, b, c]: [f32; 3]) -> bool {
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         let top = high.max(-low);
         low.abs().min(high.abs()) >= EVEN_COSINE * top && low * high >= 0.0 || top <= LOW_COSINE * self.highest
     }
 
-    /// Parts of one cell. `corners` and `centers` are by coordinate; the share is that of one part.
+    /// Weighs cells of one size. With `constant_radiance` what is seen behind them is known to be the same everywhere.
     #[inline(always)]
-    fn judge<const COUNT: usize>(
+    fn weigh_cells<const COUNT: usize>(
         &self,
         parts: &Places<COUNT>,
         averages: &[f32; COUNT],
-        even: bool,
+        constant_radiance: bool,
         vertices: impl Fn(usize) -> [Vec3; 3],
     ) -> Weighed<COUNT> {
         let [x, y, z] = &parts.centers;
@@ -57,12 +57,12 @@ impl Lit<'_> {
         let mut weights = self.illumination.estimate(&self.receiver, &views, vertices);
         let radius2 = self.radius2 * parts.share;
         let far: [bool; COUNT] = core::array::from_fn(|i| {
-            radius2 <= FAR * distance2[i] && self.is_evenly_lifted(parts.heights.map(|height| height[i]))
+            radius2 <= FAR * distance2[i] && self.has_constant_cosine(parts.heights.map(|height| height[i]))
         });
-        let Some(environment) = self.environment.filter(|_| !even) else {
-            return Weighed { weights, uniform: far, even: [true; COUNT] };
+        let Some(environment) = self.environment.filter(|_| !constant_radiance) else {
+            return Weighed { weights, is_final: far, constant_radiance: [true; COUNT] };
         };
-        let (mut uniform, mut is_even) = (far, [false; COUNT]);
+        let (mut is_final, mut constant_radiance) = (far, [false; COUNT]);
         for i in 0..COUNT {
             if averages[i] == 0.0 || weights[i] == 0.0 {
                 continue;
@@ -71,21 +71,21 @@ impl Lit<'_> {
             let seen = environment.average(&footprint);
             let one_texel = footprint.sin_radius < 1.0 && footprint.solid_angle <= environment.texel_solid_angle();
             weights[i] *= seen.value;
-            uniform[i] = one_texel || (seen.even && far[i]);
-            is_even[i] = one_texel || seen.even;
+            is_final[i] = one_texel || (seen.even && far[i]);
+            constant_radiance[i] = one_texel || seen.even;
         }
-        Weighed { weights, uniform, even: is_even }
+        Weighed { weights, is_final, constant_radiance }
     }
 }
 
 /// What weighing finds out about cells of one size.
 struct Weighed<const COUNT: usize> {
-    /// See [`Worth::weight`].
+    /// See [`CellWeight::weight`].
     weights: [f32; COUNT],
-    /// See [`Worth::uniform`].
-    uniform: [bool; COUNT],
-    /// See [`Worth::even`].
-    even: [bool; COUNT],
+    /// See [`CellWeight::is_final`].
+    is_final: [bool; COUNT],
+    /// Whether what is seen behind a cell is the same all over it.
+    constant_radiance: [bool; COUNT],
 }
 
 /// Where the parts of a cell lie.
@@ -102,27 +102,55 @@ struct Places<const COUNT: usize> {
     share: f32,
 }
 
-impl Shape for Lit<'_> {
+/// A cell of a triangle as the target keeps it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SpatialCell {
+    /// The corners relative to the shading point.
+    corners: [Vec3; 3],
+    /// Whether what is seen behind the cell is known to be the same all over it.
+    constant_radiance: bool,
+    /// The same for each of its children.
+    children_constant_radiance: [bool; ARITY],
+}
+
+impl CellTarget for Lit<'_> {
+    type Cell = SpatialCell;
+
     #[inline]
-    fn worth(&self, cell: &Cell) -> Worth {
-        let [a, b, c] = cell.vertices;
-        let parts = Places {
-            heights: cell.vertices.map(|v| [self.normal_of_receiver.dot(v)]),
-            weights: [[1.0 / 3.0]; 3],
-            centers: ((a + b + c) * (1.0 / 3.0)).to_array().map(|x| [x]),
-            weighted: None,
-            share: cell.share(),
-        };
-        let Weighed { weights: [weight], uniform: [uniform], even: [even] } =
-            self.judge(&parts, &[1.0], false, |_| cell.vertices);
-        Worth { weight, uniform, even }
+    fn whole(&self) -> SpatialCell {
+        SpatialCell { corners: self.vertices, constant_radiance: false, children_constant_radiance: [false; ARITY] }
     }
 
     #[inline]
-    fn worths(&self, cell: &Cell, texture: &Parts<'_>, even: bool) -> Worths {
-        let [a, b, c] = cell.vertices;
+    fn child(&self, cell: &SpatialCell, index: usize) -> SpatialCell {
+        SpatialCell {
+            corners: blas::child_corners(&cell.corners, index),
+            constant_radiance: cell.children_constant_radiance[index],
+            children_constant_radiance: [false; ARITY],
+        }
+    }
+
+    #[inline]
+    fn weigh(&self, at: LatticeCell, cell: &mut SpatialCell) -> CellWeight {
+        let [a, b, c] = cell.corners;
+        let parts = Places {
+            heights: cell.corners.map(|v| [self.normal_of_receiver.dot(v)]),
+            weights: [[1.0 / 3.0]; 3],
+            centers: ((a + b + c) * (1.0 / 3.0)).to_array().map(|x| [x]),
+            weighted: None,
+            share: at.area(),
+        };
+        let Weighed { weights: [weight], is_final: [is_final], constant_radiance: [constant_radiance] } =
+            self.weigh_cells(&parts, &[1.0], false, |_| cell.corners);
+        cell.constant_radiance = constant_radiance;
+        CellWeight { weight, is_final }
+    }
+
+    #[inline]
+    fn weigh_children(&self, at: LatticeCell, cell: &mut SpatialCell, texture: &TextureChildren<'_>) -> CellWeights {
+        let [a, b, c] = cell.corners;
         let center = (a + b + c) * (1.0 / 3.0);
-        let is_near = self.radius2 * cell.share() > NEAR * center.length_squared();
+        let is_near = self.radius2 * at.area() > NEAR * center.length_squared();
         let weights = if is_near { texture.centers() } else { [[1.0 / 3.0; ARITY]; 3] };
         let weighted = is_near.then(|| {
             [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]].map(|values| {
@@ -131,15 +159,18 @@ impl Shape for Lit<'_> {
             })
         });
         let parts = Places {
-            heights: blas::at_corners(cell.vertices.map(|v| self.normal_of_receiver.dot(v))),
+            heights: blas::at_corners(cell.corners.map(|v| self.normal_of_receiver.dot(v))),
             weights,
             weighted,
-            centers: blas::centers(&cell.vertices),
-            share: cell.share() * (1.0 / ARITY as f32),
+            centers: blas::centers(&cell.corners),
+            share: at.area() * (1.0 / ARITY as f32),
         };
-        let Weighed { weights, uniform, even } =
-            self.judge(&parts, &texture.averages, even, |i| cell.child(i).vertices);
-        Worths { weights, uniform, even }
+        let Weighed { weights, is_final, constant_radiance } =
+            self.weigh_cells(&parts, &texture.averages, cell.constant_radiance, |i| {
+                blas::child_corners(&cell.corners, i)
+            });
+        cell.children_constant_radiance = constant_radiance;
+        CellWeights { weights, is_final }
     }
 }
 

@@ -8,7 +8,7 @@ use core::ops::ControlFlow;
 use super::energy::{Energies, Scales};
 use super::lights::{LightSampler, NO_AREA, NO_LEAF};
 use super::mesh::{Kind, Mesh, Sides, TextureId, Weight, check_triangles};
-use crate::blas::{self, Function, Prepared, Procedural, Root, Texture};
+use crate::blas::{self, Procedural, RegisteredFunction, Root, Texture, TexturePyramid};
 use crate::env::Environment;
 use crate::error::{Error, Kind as ErrorKind};
 use crate::light::{Illumination, LightTriangle};
@@ -18,8 +18,8 @@ use crate::tlas::{self, MAX_LEAVES, Report};
 /// What a textured weight is read from.
 #[derive(Debug)]
 enum Surface<'a> {
-    Image(Prepared<'a>),
-    Function(Function<'a>),
+    Image(TexturePyramid<'a>),
+    Function(RegisteredFunction<'a>),
 }
 
 /// Collects the lights of a scene and builds a [`LightSampler`].
@@ -38,7 +38,7 @@ pub struct LightSamplerBuilder<'a, const N: usize = 16> {
     places: Vec<u32>,
     /// Where each mesh starts in `places`, and the end.
     meshes: Vec<u32>,
-    cells: Vec<blas::Block>,
+    cells: Vec<blas::CellBlock>,
     /// Trees over textures by texture and the bits of the three uvs.
     shared: BTreeMap<(usize, [u32; 6]), Root>,
 }
@@ -79,14 +79,14 @@ impl<'a, const N: usize> LightSamplerBuilder<'a, N> {
 
     /// Adds a texture that meshes can refer to. Its texels are needed until [`Self::build`].
     pub fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
-        self.textures.push(Surface::Image(Prepared::new(texture)));
+        self.textures.push(Surface::Image(TexturePyramid::new(texture)));
         TextureId(self.textures.len() - 1)
     }
 
     /// Adds a function of texture coordinates that meshes can refer to like a texture. It is asked by
     /// [`Self::add_mesh`].
     pub fn add_procedural(&mut self, function: &'a dyn Procedural) -> TextureId {
-        self.textures.push(Surface::Function(Function::new(function)));
+        self.textures.push(Surface::Function(RegisteredFunction::new(function)));
         TextureId(self.textures.len() - 1)
     }
 
@@ -228,7 +228,7 @@ impl<'a, const N: usize> LightSamplerBuilder<'a, N> {
     }
 
     /// What guides the mesh, if that is a function.
-    fn function(&mut self, mesh: &Mesh<'_>) -> Option<&mut Function<'a>> {
+    fn function(&mut self, mesh: &Mesh<'_>) -> Option<&mut RegisteredFunction<'a>> {
         let Weight::Texture(TextureId(texture)) = mesh.weight else { return None };
         match &mut self.textures[texture] {
             Surface::Function(function) => Some(function),

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::lights::{LightSampler, LightSamplerView};
 use super::sample::{to_finite, to_positive};
-use crate::blas::{self, Cell, Domain, Draw, Follow, Guide, Lattice, Shape, Worth};
+use crate::blas::{self, CellTarget, CellWeight, Draw, Follow, Guide, Lattice, LatticeCell};
 use crate::env::Directions;
 use crate::geometry;
 use crate::light::LightTriangle;
@@ -57,10 +57,16 @@ pub struct Emission<'a, const N: usize = 16> {
 /// A cell of the texture is as good as any other of the same average.
 struct Everywhere;
 
-impl Shape for Everywhere {
+impl CellTarget for Everywhere {
+    type Cell = ();
+
+    fn whole(&self) {}
+
+    fn child(&self, (): &(), _index: usize) {}
+
     #[inline]
-    fn worth(&self, _cell: &Cell) -> Worth {
-        Worth { weight: 1.0, uniform: true, even: true }
+    fn weigh(&self, _at: LatticeCell, (): &mut ()) -> CellWeight {
+        CellWeight { weight: 1.0, is_final: true }
     }
 }
 
@@ -227,15 +233,15 @@ impl<const N: usize> Emission<'_, N> {
     }
 
     /// A point of a triangle by the averages of its texture, as a guide leads.
-    fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, Domain) -> Lattice) -> Option<Start> {
+    fn start<G: Guide>(&self, leaf: u32, guide: &mut G, point: impl Fn(&G, LatticeCell) -> Lattice) -> Option<Start> {
         let light = &self.lights.triangles[leaf as usize];
         if self.lights.scale(light) == 0.0 {
             return None;
         }
         let triangle = light.triangle();
         let (normal, area) = triangle.normal_and_area()?;
-        let (cell, pmf) = blas::descend(self.lights.cells, light.root, [Vec3::ZERO; 3], &Everywhere, guide)?;
-        let place = point(guide, cell.domain);
+        let (cell, pmf) = blas::descend(self.lights.cells, light.root, &Everywhere, guide)?;
+        let place = point(guide, cell);
         let [b1, b2] = place.to_barycentrics().map(f64::from);
         let [v0, v1, v2] = triangle.exactly_relative_to(Vec3::ZERO);
         Some(Start {
@@ -243,7 +249,7 @@ impl<const N: usize> Emission<'_, N> {
             position: v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2,
             normal,
             two_sided: light.is_two_sided(),
-            pdf_area: pmf / (f64::from(area) * f64::from(cell.share())),
+            pdf_area: pmf / (f64::from(area) * f64::from(cell.area())),
         })
     }
 

@@ -27,7 +27,7 @@ pub struct LightSampler<const N: usize = 16> {
     pub(super) tlas: Tlas<N>,
     /// In the order of the tree's leaves.
     pub(super) triangles: Vec<LightTriangle>,
-    pub(super) cells: Vec<blas::Block>,
+    pub(super) cells: Vec<blas::CellBlock>,
     /// Where the triangles of each mesh start in `leaves`, and their number at the end.
     pub(super) meshes: Vec<u32>,
     /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`].
@@ -51,7 +51,7 @@ pub struct LightSampler<const N: usize = 16> {
 pub struct LightSamplerView<'a, const N: usize = 16> {
     pub(super) tlas: TlasView<'a, N>,
     pub(super) triangles: &'a [LightTriangle],
-    pub(super) cells: &'a [blas::Block],
+    pub(super) cells: &'a [blas::CellBlock],
     pub(super) meshes: &'a [u32],
     pub(super) leaves: &'a [u32],
     pub(super) scales: &'a [f32],

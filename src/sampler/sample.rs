@@ -34,9 +34,9 @@ impl<const N: usize> PointSampler<'_, N> {
         let lit = lit.as_ref()?;
         let mut draw = Draw::new(u);
         let root = self.lights.triangles[leaf as usize].root;
-        let (cell, cell_pmf) = blas::descend(self.lights.cells, root, lit.vertices, lit, &mut draw)?;
-        let place = draw.point(cell.domain);
-        let tree_pdf = count * lit.per_solid_angle(pdf_area(lit, &cell, cell_pmf), lit.point(place))?;
+        let (cell, cell_pmf) = blas::descend(self.lights.cells, root, lit, &mut draw)?;
+        let place = draw.point(cell);
+        let tree_pdf = count * lit.per_solid_angle(pdf_area(lit, cell, cell_pmf), lit.point(place))?;
         self.finish(&Drawn { leaf, place, count, tree_pdf }, lit)
     }
 
@@ -92,15 +92,15 @@ pub(super) struct Drawn {
 }
 
 /// Density per area of the points of a cell that was chosen with this probability.
-pub(super) fn pdf_area(lit: &Lit<'_>, cell: &blas::Cell, cell_pmf: f64) -> f64 {
-    cell_pmf / (f64::from(lit.area) * f64::from(cell.share()))
+pub(super) fn pdf_area(lit: &Lit<'_>, cell: blas::LatticeCell, cell_pmf: f64) -> f64 {
+    cell_pmf / (f64::from(lit.area) * f64::from(cell.area()))
 }
 
 /// Density per solid angle, on a triangle that is chosen, of a given point.
-pub(super) fn follow(cells: &[blas::Block], root: blas::Root, lit: &Lit<'_>, place: Lattice) -> Option<f64> {
+pub(super) fn follow(cells: &[blas::CellBlock], root: blas::Root, lit: &Lit<'_>, place: Lattice) -> Option<f64> {
     let mut guide = blas::Follow::new(place);
-    let (cell, cell_pmf) = blas::descend(cells, root, lit.vertices, lit, &mut guide)?;
-    lit.per_solid_angle(pdf_area(lit, &cell, cell_pmf), lit.point(place))
+    let (cell, cell_pmf) = blas::descend(cells, root, lit, &mut guide)?;
+    lit.per_solid_angle(pdf_area(lit, cell, cell_pmf), lit.point(place))
 }
 
 /// A positive density in single precision: what is positive in double stays so.

@@ -11,7 +11,7 @@ use glam::Vec3;
 use super::at::PointSampler;
 use super::lights::LightSamplerView;
 use super::techniques::{ANY, MAX_SEEN, Pairs, Seen, Techniques};
-use crate::blas::{self, Lattice, Shape};
+use crate::blas::{CellTarget, Lattice, LatticeCell};
 use crate::env::Sun;
 use crate::geometry;
 use crate::light::{Lit, Sunlit};
@@ -44,7 +44,7 @@ impl<const N: usize> LightSamplerView<'_, N> {
     fn irradiance_from_one(&self, x: &ShadingPoint) -> f32 {
         let [light] = self.triangles else { return 0.0 };
         let Some(lit) = self.lit(0, x) else { return 0.0 };
-        PI * light.root.average * self.scale(light) * lit.worth(&blas::Cell::root(lit.vertices)).weight
+        PI * light.root.average * self.scale(light) * lit.weigh(LatticeCell::whole(), &mut lit.whole()).weight
     }
 
     /// Appends the portals that a sun is seen through.

@@ -11,7 +11,7 @@ fn numbering() {
     let r = EDGE_CELLS;
     let size = 16 * r;
     let t = size / r;
-    let parent = Cell { offset: [0; 3], inverted: false, size };
+    let parent = LatticeCell { offset: [0; 3], inverted: false, size };
     let mut inside = [0u32; ARITY];
     for j1 in 0..=size {
         for j2 in 0..=size - j1 {
@@ -49,7 +49,7 @@ fn paths(seed: u64) {
     let mut rng = Pcg32::new(seed, 3);
     let levels = MAX_DEPTH / LEVEL_HALVINGS;
     for _ in 0..2000 {
-        let mut cell = Cell::root();
+        let mut cell = LatticeCell::whole();
         let mut path = [0; MAX_DEPTH as usize];
         for index in &mut path[..levels as usize] {
             *index = rng.below(ARITY as u32) as usize;
@@ -92,7 +92,7 @@ fn everywhere() {
         points.push([LATTICE - j1 - j2, j1, j2]);
     }
     for point in points {
-        let (mut local, mut cell) = (point, Cell::root());
+        let (mut local, mut cell) = (point, LatticeCell::whole());
         for _ in 0..MAX_DEPTH / LEVEL_HALVINGS {
             let (index, next) = child(local, cell.size);
             cell = cell.child(index);
@@ -131,7 +131,7 @@ fn any_random_numbers_are_safe() {
     }
 }
 
-/// The points' mean is the centre, and a quarter of them is in each quarter.
+/// The points' mean is the center, and a quarter of them is in each quarter.
 #[test]
 fn interior_points_are_uniform() {
     let n = 1024;
@@ -156,7 +156,7 @@ fn interior_points_are_uniform() {
 
 #[test]
 fn cells_hold_the_points_strictly_inside() {
-    let parent = Cell { offset: [0; 3], inverted: false, size: 32 };
+    let parent = LatticeCell { offset: [0; 3], inverted: false, size: 32 };
     for index in 0..ARITY {
         let cell = parent.child(index);
         let mut held = 0;

@@ -5,34 +5,42 @@ use alloc::vec::Vec;
 use glam::{Vec2, Vec3};
 
 use super::*;
-use crate::blas::{Prepared, Texture, build};
+use crate::blas::walk::{CellWeight, CellWeights, Draw, Follow, child_corners};
+use crate::blas::{ARITY, Texture, TexturePyramid, build};
 use crate::record::Filter;
 use crate::testing::Pcg32;
-use crate::warp::seed;
+use crate::warp::{Variate, seed};
 
-/// Worth nothing left of a line; elsewhere the more, the nearer. Ends at a given size.
+/// Weighs nothing left of a line; elsewhere the more, the nearer. Ends at a given size.
 struct Halved {
+    vertices: [Vec3; 3],
     smallest: u32,
 }
 
-impl Shape for Halved {
-    fn worth(&self, cell: &Cell) -> Worth {
-        let weight = if cell.vertices.iter().all(|v| v.x < 0.1) {
+impl CellTarget for Halved {
+    type Cell = [Vec3; 3];
+
+    fn whole(&self) -> [Vec3; 3] {
+        self.vertices
+    }
+
+    fn child(&self, cell: &[Vec3; 3], index: usize) -> [Vec3; 3] {
+        child_corners(cell, index)
+    }
+
+    fn weigh(&self, at: LatticeCell, cell: &mut [Vec3; 3]) -> CellWeight {
+        let weight = if cell.iter().all(|v| v.x < 0.1) {
             0.0
         } else {
-            1.0 / cell.vertices.iter().copied().sum::<Vec3>().length_squared()
+            1.0 / cell.iter().copied().sum::<Vec3>().length_squared()
         };
-        Worth { weight, uniform: cell.domain.size <= self.smallest, even: true }
+        CellWeight { weight, is_final: at.size <= self.smallest }
     }
 
-    fn worths(&self, cell: &Cell, _texture: &Parts<'_>, _even: bool) -> Worths {
-        one_by_one(self, cell)
+    fn weigh_children(&self, at: LatticeCell, cell: &mut [Vec3; 3], _texture: &TextureChildren<'_>) -> CellWeights {
+        let weights = core::array::from_fn(|i| self.weigh(at.child(i), &mut self.child(cell, i)));
+        CellWeights { weights: weights.map(|w| w.weight), is_final: weights.map(|w| w.is_final) }
     }
-}
-
-fn one_by_one(shape: &impl Shape, cell: &Cell) -> Worths {
-    let worths: [Worth; ARITY] = core::array::from_fn(|i| shape.worth(&cell.child(i)));
-    Worths { weights: worths.map(|w| w.weight), uniform: worths.map(|w| w.uniform), even: worths.map(|w| w.even) }
 }
 
 /// Follows given indices, then stops choosing: it notes the weights of the first choice that was not given.
@@ -57,13 +65,12 @@ impl Guide for Scripted<'_> {
 }
 
 /// Probability of all leaves, and of all dead ends.
-fn masses(nodes: &[Block], root: Root, shape: &Halved) -> (f64, f64) {
-    let vertices = [Vec3::new(-1.0, 0.0, 1.0), Vec3::new(1.0, 0.5, 1.5), Vec3::new(0.5, 1.0, 0.75)];
+fn masses(nodes: &[CellBlock], root: Root, shape: &Halved) -> (f64, f64) {
     let (mut leaves, mut dead) = (0.0, 0.0);
     let mut open = Vec::from([(Vec::new(), 1.0)]);
     while let Some((script, mass)) = open.pop() {
         let mut guide = Scripted { script: &script, next: None, at: 0 };
-        let found = descend(nodes, root, vertices, shape, &mut guide);
+        let found = descend(nodes, root, shape, &mut guide);
         match (guide.next, found) {
             (Some(weights), _) => {
                 let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
@@ -83,19 +90,20 @@ fn masses(nodes: &[Block], root: Root, shape: &Halved) -> (f64, f64) {
     (leaves, dead)
 }
 
-fn tree(pcg: &mut Pcg32) -> (Vec<Block>, Root) {
+fn tree(pcg: &mut Pcg32) -> (Vec<CellBlock>, Root) {
     let texels: Vec<f32> = (0..16 * 16).map(|_| if pcg.next_f32() < 0.2 { pcg.next_f32() } else { 0.0 }).collect();
     let texture = Texture::new(16, 16, &texels).expect("texels are finite").filter(Filter::Nearest);
     let mut nodes = Vec::new();
     let uvs = [Vec2::new(0.1, 0.0), Vec2::new(0.9, 0.2), Vec2::new(0.3, 1.0)];
-    let root = build(&mut Prepared::new(texture), uvs, &mut nodes).expect("uvs are finite");
+    let root = build(&mut TexturePyramid::new(texture), uvs, &mut nodes).expect("uvs are finite");
     (nodes, root)
 }
 
 fn all_ways_have_all_the_probability() {
     let (nodes, root) = tree(&mut Pcg32::new(1, 2));
-    for smallest in [barycentric::LATTICE, barycentric::LATTICE >> 6] {
-        let (leaves, dead) = masses(&nodes, root, &Halved { smallest });
+    let vertices = [Vec3::new(-1.0, 0.0, 1.0), Vec3::new(1.0, 0.5, 1.5), Vec3::new(0.5, 1.0, 0.75)];
+    for smallest in [LATTICE, LATTICE >> 6] {
+        let (leaves, dead) = masses(&nodes, root, &Halved { vertices, smallest });
         assert!((leaves + dead - 1.0).abs() < 1e-9 && leaves > 0.5, "{leaves} + {dead}");
     }
 }
@@ -109,18 +117,18 @@ fn a_drawn_point_leads_back() {
     let mut pcg = Pcg32::new(2, 2);
     let (nodes, root) = tree(&mut pcg);
     let vertices = [Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.5, 1.5), Vec3::new(0.5, 1.0, 0.75)];
-    let shape = Halved { smallest: 16 };
+    let shape = Halved { vertices, smallest: 16 };
     for i in 0..20_000 {
         let edges = [0.0, 1.0 - f32::EPSILON / 2.0, 0.5, f32::MIN_POSITIVE];
         let mut number = || if i % 7 == 0 { edges[pcg.next_u32() as usize % 4] } else { pcg.next_f32() };
         let u = [number(), number()];
         let salt = seed(&u);
         let mut draw = Draw::new([Variate::new(u[0], salt), Variate::new(u[1], salt ^ 1)]);
-        let Some((cell, pmf)) = descend(&nodes, root, vertices, &shape, &mut draw) else { continue };
-        let point = draw.point(cell.domain);
-        let found = descend(&nodes, root, vertices, &shape, &mut Follow::new(point));
+        let Some((cell, pmf)) = descend(&nodes, root, &shape, &mut draw) else { continue };
+        let point = draw.point(cell);
+        let found = descend(&nodes, root, &shape, &mut Follow::new(point));
         let (again, again_pmf) = found.expect("a drawn point can be drawn");
-        assert_eq!((again.domain, again_pmf), (cell.domain, pmf));
+        assert_eq!((again, again_pmf), (cell, pmf));
     }
 }
 
@@ -133,22 +141,23 @@ fn the_way_back_from_a_drawn_point_is_the_same() {
 #[test]
 fn stratified_input_stays_stratified() {
     struct Uniform;
-    impl Shape for Uniform {
-        fn worth(&self, cell: &Cell) -> Worth {
-            Worth { weight: 1.0, uniform: cell.domain.size <= barycentric::LATTICE >> 6, even: true }
-        }
+    impl CellTarget for Uniform {
+        type Cell = ();
 
-        fn worths(&self, cell: &Cell, _texture: &Parts<'_>, _even: bool) -> Worths {
-            one_by_one(self, cell)
+        fn whole(&self) {}
+
+        fn child(&self, (): &(), _index: usize) {}
+
+        fn weigh(&self, at: LatticeCell, (): &mut ()) -> CellWeight {
+            CellWeight { weight: 1.0, is_final: at.size <= LATTICE >> 6 }
         }
     }
-    let vertices = [Vec3::X, Vec3::Y, Vec3::Z];
     let mut cells = alloc::collections::BTreeSet::new();
     for i in 0..64 * 64 {
         let u = [i % 64, i / 64].map(|x| (x as f32 + 0.5) / 64.0);
         let mut draw = Draw::new([Variate::new(u[0], 0), Variate::new(u[1], 1)]);
-        let (cell, _) = descend(&[], Root::constant(1.0), vertices, &Uniform, &mut draw).expect("nothing is dark");
-        cells.insert((cell.domain.offset, cell.domain.inverted));
+        let (cell, _) = descend(&[], Root::constant(1.0), &Uniform, &mut draw).expect("nothing is dark");
+        cells.insert((cell.offset, cell.inverted));
     }
     assert_eq!(cells.len(), 64 * 64);
 }

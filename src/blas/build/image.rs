@@ -5,15 +5,15 @@ use core::convert::Infallible;
 
 use glam::Vec2;
 
-use crate::blas::barycentric::{ARITY, Cell, LATTICE, LEVEL_HALVINGS, MAX_DEPTH};
-use crate::blas::coverage::{average, storable};
-use crate::blas::footprint::{Chart, check_uv};
-use crate::blas::grow::{Limits, Source, Tree, grow};
-use crate::blas::node::{Block, CELLS, LEAF, Root, append, end};
-use crate::blas::pyramid::Prepared;
-use crate::blas::texture::Texture;
-use crate::blas::touched::{self, Range};
-use crate::error::{Error, Kind};
+use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_DEPTH};
+use crate::blas::build::coverage::average;
+use crate::blas::build::footprint::{UvTriangle, check_uv};
+use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
+use crate::blas::build::pyramid::{BYTES_PER_IMAGE, TexturePyramid};
+use crate::blas::build::texture::Texture;
+use crate::blas::build::touched::{self, TexelRange};
+use crate::blas::node::{CELLS, CellBlock, Root, storable};
+use crate::error::Error;
 use crate::record::{Filter, Wrap};
 
 /// A cell with no more area than this, in texels, is fine if it is short, too.
@@ -23,7 +23,7 @@ const FINE_AREA: f64 = 1.0;
 const FINE_LENGTH: f64 = 1.5;
 
 /// A fine cell may still be halved so often where its contrast is worth it: along sharp edges between texels, and
-/// where look-up blurs them.
+/// where lookup blurs them.
 const EXTRA_HALVINGS: [u32; 2] = [6, 2];
 
 /// What the contrast of fine cells that are not divided may add to the relative variance.
@@ -34,10 +34,6 @@ const RAMP: f64 = 1.0 / 3.0;
 
 /// Memory for each texel that a triangle covers. Where it covers copies of them, each texel counts for a quarter.
 const BYTES_PER_TEXEL: f64 = 2.0;
-
-/// Memory for edges between the few large texels of a small image. All its triangles share it: the first ones take what
-/// they need.
-pub(super) const BYTES_PER_IMAGE: f64 = (1 << 18) as f64;
 
 /// So many copies of texels count as texels of their own.
 const TEXELS_OF_COPIES: f64 = (1 << 15) as f64;
@@ -53,18 +49,22 @@ const LEAVES_PER_COPY: f64 = 4.0;
 
 /// Adds the BLAS of a triangle with these texture coordinates to the pool.
 ///
-/// A cell is divided until look-ups in it are all the same, or until it has at most one texel's area and edges of at
-/// most 1.5 texels; beyond that, up to six times (twice with bilinear look-up), where an edge of the image runs through. A triangle whose memory
+/// A cell is divided until lookups in it are all the same, or until it has at most one texel's area and edges of at
+/// most 1.5 texels; beyond that, up to six times (twice with bilinear lookup), where an edge of the image runs through. A triangle whose memory
 /// runs out divides the cells first that are worth most; the others keep their average. There are two bytes for each
 /// texel that it can see, half a byte (for 2^15 texels at least) where it sees copies of them, more for images of less than 2^17 texels,
 /// and 4 MB in all. If that leaves fewer than four leaves for each copy of the image, the triangle is not divided.
 ///
 /// # Errors
 ///
-/// If a coordinate is not finite or beyond [`UV_LIMIT`](crate::blas::footprint::UV_LIMIT) (a caller that knows the
+/// If a coordinate is not finite or beyond [`UV_LIMIT`](crate::blas::build::footprint::UV_LIMIT) (a caller that knows the
 /// mesh checks first, with [`check_uv`]; here the error says mesh 0), or if the pool has no more indices. The pool
 /// is then as it was.
-pub(crate) fn build(prepared: &mut Prepared<'_>, uv: [Vec2; 3], pool: &mut Vec<Block>) -> Result<Root, Error> {
+pub(crate) fn build(
+    prepared: &mut TexturePyramid<'_>,
+    uv: [Vec2; 3],
+    pool: &mut Vec<CellBlock>,
+) -> Result<Root, Error> {
     for (vertex, uv) in uv.into_iter().enumerate() {
         check_uv(0, vertex, uv)?;
     }
@@ -72,10 +72,10 @@ pub(crate) fn build(prepared: &mut Prepared<'_>, uv: [Vec2; 3], pool: &mut Vec<B
     if whole.min == whole.max {
         return Ok(Root::constant(storable(f64::from(whole.max))));
     }
-    let chart = Chart::new(prepared.texture(), uv);
-    let footprint = chart.footprint(Cell::root());
+    let chart = UvTriangle::new(prepared.texture(), uv);
+    let footprint = chart.footprint(LatticeCell::whole());
     let range = touched::range(prepared, &footprint, true);
-    let memory = Memory::new(&chart, prepared);
+    let memory = TreeBudget::new(&chart, prepared);
     let nodes = memory.nodes(&chart, prepared.texture());
     if range.is_constant() || nodes == 0 {
         return Ok(Root::constant(average(prepared, &footprint, range)));
@@ -85,40 +85,27 @@ pub(crate) fn build(prepared: &mut Prepared<'_>, uv: [Vec2; 3], pool: &mut Vec<B
     let extra = if prepared.texture().filtering() == Filter::Nearest { sharp } else { blurred };
     let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_DEPTH / LEVEL_HALVINGS);
     debug_assert!(LATTICE >> (deepest * LEVEL_HALVINGS) >= 16);
-    let source = ImageOn { prepared, chart: &chart };
-    let Ok(tree) = grow(&source, range, &Limits { nodes, fine, deepest, variance: VARIANCE });
-    let (root, bytes) = store(&tree, pool)?;
+    let source = ImageOnTriangle { prepared, chart: &chart };
+    let Ok(tree) = grow(&source, range, &GrowthLimits { nodes, fine, deepest, variance: VARIANCE });
+    let (root, bytes) = tree.store(pool)?;
     prepared.extra -= (bytes - memory.own).max(0.0).min(prepared.extra);
     Ok(root)
 }
 
-/// Adds a tree to the pool. Second, the bytes that it takes.
-pub(super) fn store(tree: &Tree, pool: &mut Vec<Block>) -> Result<(Root, f64), Error> {
-    if tree.divided.is_empty() || tree.average == 0.0 {
-        return Ok((Root::constant(tree.average), 0.0));
-    }
-    let count = end(pool, tree.divided.len() / ARITY);
-    if count >= LEAF as usize {
-        return Err(Error(Kind::TooMany { what: "BLAS nodes", count, limit: LEAF as usize }));
-    }
-    let bytes = tree.averages.len().div_ceil(CELLS) * size_of::<Block>();
-    Ok((Root { average: tree.average, node: append(pool, &tree.averages, &tree.divided) }, bytes as f64))
-}
-
 /// An image on a triangle.
-struct ImageOn<'a> {
-    prepared: &'a Prepared<'a>,
-    chart: &'a Chart,
+struct ImageOnTriangle<'a> {
+    prepared: &'a TexturePyramid<'a>,
+    chart: &'a UvTriangle,
 }
 
-impl Source for ImageOn<'_> {
+impl WeightSource for ImageOnTriangle<'_> {
     type Fault = Infallible;
 
-    fn range(&self, cell: Cell, exact: bool) -> Result<Range, Infallible> {
+    fn range(&self, cell: LatticeCell, exact: bool) -> Result<TexelRange, Infallible> {
         Ok(touched::range(self.prepared, &self.chart.footprint(cell), exact))
     }
 
-    fn average(&self, cell: Cell, range: Range) -> Result<f32, Infallible> {
+    fn average(&self, cell: LatticeCell, range: TexelRange) -> Result<f32, Infallible> {
         Ok(average(self.prepared, &self.chart.footprint(cell), range))
     }
 
@@ -131,7 +118,7 @@ impl Source for ImageOn<'_> {
 }
 
 /// How many levels it takes until cells are fine.
-fn levels(chart: &Chart) -> u32 {
+fn levels(chart: &UvTriangle) -> u32 {
     let halvings = LEVEL_HALVINGS;
     let (double_area, longest) = chart.extent();
     let mut levels = 0;
@@ -146,15 +133,15 @@ fn levels(chart: &Chart) -> u32 {
 }
 
 /// How many bytes a triangle may take.
-struct Memory {
+struct TreeBudget {
     /// Whatever other triangles take.
     own: f64,
     /// With what is left of its image's.
     most: f64,
 }
 
-impl Memory {
-    fn new(chart: &Chart, prepared: &Prepared<'_>) -> Self {
+impl TreeBudget {
+    fn new(chart: &UvTriangle, prepared: &TexturePyramid<'_>) -> Self {
         let [w, h] = chart.box_size().map(|n| n + 2.0);
         let size = prepared.texture().size().map(f64::from);
         let covered = chart.covered();
@@ -166,11 +153,11 @@ impl Memory {
     }
 
     /// The number of nodes that there is memory for, 0 if dividing would not help.
-    fn nodes(&self, chart: &Chart, texture: &Texture<'_>) -> usize {
+    fn nodes(&self, chart: &UvTriangle, texture: &Texture<'_>) -> usize {
         if chart.covered() < LEAST_TEXELS {
             return 0;
         }
-        let blocks = ((self.most / size_of::<Block>() as f64) as usize).max(1);
+        let blocks = ((self.most / size_of::<CellBlock>() as f64) as usize).max(1);
         let nodes = blocks * CELLS / ARITY;
         let [w, h] = texture.size().map(f64::from);
         let copies = 0.5 * chart.extent().0 / (w * h);

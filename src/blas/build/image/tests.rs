@@ -2,8 +2,9 @@ use glam::Vec2;
 
 use super::*;
 use crate::blas::barycentric::{Lattice, child};
-use crate::blas::node::{averages, below, mean};
+use crate::blas::node::{LEAF, averages, below, end, mean};
 use crate::blas::validate::{validate, validate_roots};
+use crate::error::Kind;
 use crate::record::Filter;
 use crate::testing::Pcg32;
 
@@ -13,7 +14,7 @@ pub(super) const LOWER: [Vec2; 3] = [Vec2::new(0.0, 0.0), Vec2::new(1.0, 0.0), V
 pub(super) const UPPER: [Vec2; 3] = [Vec2::new(0.0, 0.0), Vec2::new(1.0, 1.0), Vec2::new(0.0, 1.0)];
 
 /// The averages on a point's way down.
-fn path(root: Root, pool: &[Block], barycentrics: [f32; 2]) -> Vec<f32> {
+fn path(root: Root, pool: &[CellBlock], barycentrics: [f32; 2]) -> Vec<f32> {
     let mut values = alloc::vec![root.average];
     let scale = if root.node == LEAF { 0.0 } else { root.average / mean(pool, root.node) };
     let (mut local, mut size) = (Lattice::from_barycentrics(barycentrics).0, LATTICE);
@@ -47,7 +48,7 @@ fn random_barycentrics(rng: &mut Pcg32) -> [f32; 2] {
 
 /// Everything that a tree promises. Returns the number of bytes.
 fn check(texture: Texture<'_>, uv: [Vec2; 3], points: u32) -> usize {
-    let mut prepared = Prepared::new(texture);
+    let mut prepared = TexturePyramid::new(texture);
     let mut pool = alloc::vec![bytemuck::Zeroable::zeroed(); 4];
     let root = build(&mut prepared, uv, &mut pool).unwrap();
     validate(&pool).unwrap();
@@ -95,7 +96,7 @@ fn averages_at_the_root_are_those_of_the_image() {
     let texels: Vec<f32> = (0..64 * 64).map(|_| rng.next_f32()).collect();
     let mean = texels.iter().map(|&t| f64::from(t)).sum::<f64>() / texels.len() as f64;
     for filter in FILTERS {
-        let mut prepared = Prepared::new(Texture::new(64, 64, &texels).unwrap().filter(filter));
+        let mut prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().filter(filter));
         let mut pool = Vec::new();
         let lower = build(&mut prepared, LOWER, &mut pool).unwrap();
         let upper = build(&mut prepared, UPPER, &mut pool).unwrap();
@@ -110,7 +111,7 @@ fn black_stays_black() {
     // The left half. Repeated, the image would be white just left of it, where a host may look by rounding.
     let texels: Vec<f32> = (0..32 * 32).map(|i| if i % 32 < 16 { 0.0 } else { 1.0 }).collect();
     let texture = Texture::new(32, 32, &texels).unwrap().filter(Filter::Nearest).wrap(Wrap::Clamp, Wrap::Clamp);
-    let mut prepared = Prepared::new(texture);
+    let mut prepared = TexturePyramid::new(texture);
     let mut pool = Vec::new();
     let root = build(&mut prepared, LOWER, &mut pool).unwrap();
     let mut rng = Pcg32::new(1, 9);
@@ -141,7 +142,7 @@ fn levels_agree() {
     let mut rng = Pcg32::new(23, 4);
     for filter in FILTERS {
         let texels: Vec<f32> = (0..40 * 24).map(|_| rng.next_f32()).collect();
-        let mut prepared = Prepared::new(Texture::new(40, 24, &texels).unwrap().filter(filter));
+        let mut prepared = TexturePyramid::new(Texture::new(40, 24, &texels).unwrap().filter(filter));
         let mut pool = Vec::new();
         build(&mut prepared, random_uv(&mut rng, 1.0), &mut pool).unwrap();
         let mut divided = 0;
@@ -175,7 +176,7 @@ fn extreme_coordinates() {
         }
     }
     for bad in [f32::NAN, f32::INFINITY, 1.1e5] {
-        let mut prepared = Prepared::new(Texture::new(64, 64, &texels).unwrap());
+        let mut prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap());
         let uv = [Vec2::ZERO, Vec2::new(0.0, bad), Vec2::ONE];
         let error = build(&mut prepared, uv, &mut Vec::new()).unwrap_err();
         assert!(matches!(error.0, Kind::TextureCoordinate { vertex: 1, .. }), "{error}");
@@ -226,7 +227,7 @@ fn memory_of_noise() {
 fn edges_between_large_texels_are_followed() {
     let texels: Vec<f32> = (0..8 * 8).map(|i| if i % 8 < 4 { 0.0 } else { 1.0 }).collect();
     let texture = Texture::new(8, 8, &texels).unwrap().filter(Filter::Nearest).wrap(Wrap::Clamp, Wrap::Clamp);
-    let mut prepared = Prepared::new(texture);
+    let mut prepared = TexturePyramid::new(texture);
     let mut pool = Vec::new();
     // The edge at 0.5 is none of cells here.
     let root = build(&mut prepared, LOWER.map(|p| p * 0.7), &mut pool).unwrap();

@@ -2,8 +2,8 @@
 
 use glam::Vec2;
 
-use crate::blas::barycentric::{Cell, LATTICE};
-use crate::blas::texture::Texture;
+use crate::blas::barycentric::{LATTICE, LatticeCell};
+use crate::blas::build::texture::Texture;
 use crate::error::{Error, Kind};
 use crate::math::{floor64, sqrt64};
 
@@ -23,13 +23,13 @@ pub(crate) fn check_uv(mesh: usize, vertex: usize, uv: Vec2) -> Result<(), Error
 
 /// A triangle's texture coordinates, in texels.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Chart {
+pub(crate) struct UvTriangle {
     corners: [[f64; 2]; 3],
     /// How far off, in texels and along each axis, a host may look because it interpolates in `f32`.
     slack: [f64; 2],
 }
 
-impl Chart {
+impl UvTriangle {
     /// `uv` is within [`UV_LIMIT`].
     pub(crate) fn new(texture: &Texture<'_>, uv: [Vec2; 3]) -> Self {
         let size = texture.size().map(f64::from);
@@ -67,7 +67,7 @@ impl Chart {
     }
 
     /// The triangle under a cell.
-    pub(crate) fn footprint(&self, cell: Cell) -> Footprint {
+    pub(crate) fn footprint(&self, cell: LatticeCell) -> TexelFootprint {
         let scale = 1.0 / f64::from(LATTICE);
         let [a, b, c] = self.corners;
         // Edges first: exactly degenerate triangles stay so.
@@ -75,7 +75,7 @@ impl Chart {
             let (b1, b2) = (f64::from(p.0[1]) * scale, f64::from(p.0[2]) * scale);
             [a[0] + b1 * (b[0] - a[0]) + b2 * (c[0] - a[0]), a[1] + b1 * (b[1] - a[1]) + b2 * (c[1] - a[1])]
         });
-        Footprint::new(corners, self.slack)
+        TexelFootprint::new(corners, self.slack)
     }
 }
 
@@ -86,7 +86,7 @@ fn bounds(corners: &[[f64; 2]; 3], k: usize) -> (f64, f64) {
 
 /// A triangle in texels, ready to be tested against boxes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Footprint {
+pub(crate) struct TexelFootprint {
     /// An integer point near the triangle. All else counts from here, so that nothing is lost far from the origin.
     pub(crate) origin: [i64; 2],
     /// The corners.
@@ -95,13 +95,13 @@ pub(crate) struct Footprint {
     pub(crate) lo: [f64; 2],
     /// High end of the box around them.
     pub(crate) hi: [f64; 2],
-    /// See [`Chart`].
+    /// See [`UvTriangle`].
     pub(crate) slack: [f64; 2],
     /// The edges' normals, and what the triangle spans along each.
     normals: [([f64; 2], [f64; 2]); 3],
 }
 
-impl Footprint {
+impl TexelFootprint {
     fn new(corners: [[f64; 2]; 3], slack: [f64; 2]) -> Self {
         let origin = core::array::from_fn(|k| floor64(bounds(&corners, k).0) as i64);
         let corners = corners.map(|c| [c[0] - origin[0] as f64, c[1] - origin[1] as f64]);
@@ -127,10 +127,10 @@ impl Footprint {
         if self.lo[0] > x[1] || self.hi[0] < x[0] || self.lo[1] > y[1] || self.hi[1] < y[0] {
             return false;
         }
-        let centre = [0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1])];
+        let center = [0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1])];
         let half = [0.5 * (x[1] - x[0]), 0.5 * (y[1] - y[0])];
         self.normals.iter().all(|(n, [lo, hi])| {
-            let at = n[0] * centre[0] + n[1] * centre[1];
+            let at = n[0] * center[0] + n[1] * center[1];
             let reach = n[0].abs() * half[0] + n[1].abs() * half[1];
             at + reach >= *lo && at - reach <= *hi
         })

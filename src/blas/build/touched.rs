@@ -1,28 +1,28 @@
-//! The darkest and the brightest texel that a look-up inside of a footprint can touch.
+//! The darkest and the brightest texel that a lookup inside of a footprint can touch.
 
-use crate::blas::axis::{Stretch, stretches};
-use crate::blas::footprint::Footprint;
-use crate::blas::pyramid::Prepared;
+use crate::blas::build::axis::{TexelRun, stretches};
+use crate::blas::build::footprint::TexelFootprint;
+use crate::blas::build::pyramid::TexturePyramid;
 use crate::math::floor64;
 use crate::record::Filter;
 
-/// Minimum and maximum of the touched texels. Every look-up in the footprint lies between them.
+/// Minimum and maximum of the touched texels. Every lookup in the footprint lies between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Range {
+pub(crate) struct TexelRange {
     /// The darkest.
     pub(crate) min: f32,
     /// The brightest.
     pub(crate) max: f32,
 }
 
-impl Range {
-    /// Whether every look-up gives the same.
+impl TexelRange {
+    /// Whether every lookup gives the same.
     pub(crate) fn is_constant(self) -> bool {
         self.min == self.max
     }
 }
 
-/// How far a texel reaches beyond its own square: bilinear look-up weighs it by a tent two texels wide.
+/// How far a texel reaches beyond its own square: bilinear lookup weighs it by a tent two texels wide.
 fn support(filter: Filter) -> f64 {
     match filter {
         Filter::Nearest => 0.0,
@@ -37,7 +37,7 @@ const BLOCKS: u32 = 8;
 /// little larger. With `exact` false it is enough that a range which is not constant is found not to be.
 ///
 /// Where a footprint spans many copies of the image along an axis, all of the image along that axis counts.
-pub(crate) fn range(prepared: &Prepared<'_>, footprint: &Footprint, exact: bool) -> Range {
+pub(crate) fn range(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint, exact: bool) -> TexelRange {
     let texture = prepared.texture();
     let support = support(texture.filtering());
     let reach = footprint.slack.map(|slack| slack + support);
@@ -49,8 +49,8 @@ pub(crate) fn range(prepared: &Prepared<'_>, footprint: &Footprint, exact: bool)
     let (columns, rows) = (along(0), along(1));
     let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
     let finest = (0..prepared.top()).take_while(|level| span > f64::from((2 * BLOCKS) << level)).count() as u32;
-    let range = Range { min: f32::INFINITY, max: 0.0 };
-    let mut search = Search { prepared, footprint, reach, exact, finest, range };
+    let range = TexelRange { min: f32::INFINITY, max: 0.0 };
+    let mut search = RangeSearch { prepared, footprint, reach, exact, finest, range };
     for row in &rows {
         for column in &columns {
             search.stretch(column, row);
@@ -61,23 +61,23 @@ pub(crate) fn range(prepared: &Prepared<'_>, footprint: &Footprint, exact: bool)
     } else {
         // A footprint always lies on the plane. If rounding lost it, all of the image may be under it.
         let whole = prepared.whole();
-        Range { min: whole.min, max: whole.max }
+        TexelRange { min: whole.min, max: whole.max }
     }
 }
 
-struct Search<'a> {
-    prepared: &'a Prepared<'a>,
-    footprint: &'a Footprint,
+struct RangeSearch<'a> {
+    prepared: &'a TexturePyramid<'a>,
+    footprint: &'a TexelFootprint,
     reach: [f64; 2],
     exact: bool,
     /// Blocks of this level are not looked into.
     finest: u32,
-    range: Range,
+    range: TexelRange,
 }
 
-impl Search<'_> {
+impl RangeSearch<'_> {
     /// Starts at the level where the stretch is two blocks wide at most.
-    fn stretch(&mut self, column: &Stretch, row: &Stretch) {
+    fn stretch(&mut self, column: &TexelRun, row: &TexelRun) {
         let mut level = 0;
         while (column.last >> level) - (column.first >> level) > 1 || (row.last >> level) - (row.first >> level) > 1 {
             level += 1;
@@ -89,7 +89,7 @@ impl Search<'_> {
         }
     }
 
-    fn visit(&mut self, column: &Stretch, row: &Stretch, level: u32, x: u32, y: u32) {
+    fn visit(&mut self, column: &TexelRun, row: &TexelRun, level: u32, x: u32, y: u32) {
         let block = self.prepared.block(level, x, y);
         // Nothing new in there; this is what makes the search short.
         if block.min >= self.range.min && block.max <= self.range.max {
@@ -98,7 +98,7 @@ impl Search<'_> {
         if !self.exact && self.range.min < self.range.max {
             return;
         }
-        let clip = |stretch: &Stretch, i: u32| {
+        let clip = |stretch: &TexelRun, i: u32| {
             (stretch.first.max(i << level), stretch.last.min((i << level) + ((1 << level) - 1)))
         };
         let ((x0, x1), (y0, y1)) = (clip(column, x), clip(row, y));

@@ -5,13 +5,12 @@ use core::fmt;
 
 use glam::{DVec2, Vec2};
 
-use crate::blas::barycentric::{ARITY, Cell, LATTICE, LEVEL_HALVINGS, MAX_DEPTH};
-use crate::blas::build::store;
-use crate::blas::coverage::storable;
-use crate::blas::grow::{Limits, Source, grow};
-use crate::blas::node::{Block, CELLS, Root};
-use crate::blas::touched::Range;
+use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_DEPTH};
+use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
+use crate::blas::build::touched::TexelRange;
+use crate::blas::node::{CELLS, CellBlock, Root, storable};
 use crate::error::{Error, Kind};
+use crate::geometry::subdivision_centers;
 
 /// Memory for all triangles with the same function together; the first ones take what they need.
 const BYTES_PER_FUNCTION: f64 = (1 << 20) as f64;
@@ -91,19 +90,19 @@ where
 
 /// A function that was handed to a builder.
 #[derive(Clone, Copy)]
-pub(crate) struct Function<'a> {
+pub(crate) struct RegisteredFunction<'a> {
     function: &'a dyn Procedural,
     /// Bytes that trees over it may still take beyond those of each triangle.
     extra: f64,
 }
 
-impl fmt::Debug for Function<'_> {
+impl fmt::Debug for RegisteredFunction<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Function").field("extra", &self.extra).finish_non_exhaustive()
+        f.debug_struct("RegisteredFunction").field("extra", &self.extra).finish_non_exhaustive()
     }
 }
 
-impl<'a> Function<'a> {
+impl<'a> RegisteredFunction<'a> {
     pub(crate) fn new(function: &'a dyn Procedural) -> Self {
         Self { function, extra: BYTES_PER_FUNCTION }
     }
@@ -118,36 +117,36 @@ impl<'a> Function<'a> {
 ///
 /// If a bound is not one, a weight is outside of its bound, or the pool has no more indices. The pool is then as it was.
 pub(crate) fn build_procedural(
-    function: &mut Function<'_>,
+    function: &mut RegisteredFunction<'_>,
     mesh: usize,
     uv: [Vec2; 3],
-    pool: &mut Vec<Block>,
+    pool: &mut Vec<CellBlock>,
 ) -> Result<Root, Error> {
-    let source = FunctionOn::new(function.function, uv);
+    let source = FunctionOnTriangle::new(function.function, uv);
     let fail = |fault: Fault| Error(fault.kind(mesh));
-    let range = source.range(Cell::root(), true).map_err(fail)?;
+    let range = source.range(LatticeCell::whole(), true).map_err(fail)?;
     if range.is_constant() {
         return Ok(Root::constant(storable(f64::from(range.max))));
     }
     let most = (OWN_BYTES + function.extra).min(MAX_BYTES);
-    let blocks = ((most / size_of::<Block>() as f64) as usize).max(1);
+    let blocks = ((most / size_of::<CellBlock>() as f64) as usize).max(1);
     let deepest = MAX_DEPTH / LEVEL_HALVINGS;
-    let limits = Limits { nodes: blocks * CELLS / ARITY, fine: 0, deepest, variance: VARIANCE };
+    let limits = GrowthLimits { nodes: blocks * CELLS / ARITY, fine: 0, deepest, variance: VARIANCE };
     let tree = grow(&source, range, &limits).map_err(fail)?;
-    let (root, bytes) = store(&tree, pool)?;
+    let (root, bytes) = tree.store(pool)?;
     function.extra -= (bytes - OWN_BYTES).max(0.0).min(function.extra);
     Ok(root)
 }
 
 /// A function on a triangle.
-struct FunctionOn<'a> {
+struct FunctionOnTriangle<'a> {
     function: &'a dyn Procedural,
     corners: [DVec2; 3],
     /// How far off a host may look because it interpolates in `f32`.
     slack: DVec2,
 }
 
-impl<'a> FunctionOn<'a> {
+impl<'a> FunctionOnTriangle<'a> {
     fn new(function: &'a dyn Procedural, uv: [Vec2; 3]) -> Self {
         let largest = uv.map(Vec2::abs).into_iter().fold(Vec2::ZERO, Vec2::max);
         Self { function, corners: uv.map(Vec2::as_dvec2), slack: largest.as_dvec2() / f64::from(1 << 20) }
@@ -159,20 +158,20 @@ impl<'a> FunctionOn<'a> {
         a + b1 * (b - a) + b2 * (c - a)
     }
 
-    fn cell_corners(&self, cell: Cell) -> [DVec2; 3] {
+    fn cell_corners(&self, cell: LatticeCell) -> [DVec2; 3] {
         let scale = 1.0 / f64::from(LATTICE);
         cell.corners().map(|p| self.at(f64::from(p.0[1]) * scale, f64::from(p.0[2]) * scale))
     }
 
     /// The box around a cell.
-    fn region(&self, cell: Cell) -> [Vec2; 2] {
+    fn region(&self, cell: LatticeCell) -> [Vec2; 2] {
         let [a, b, c] = self.cell_corners(cell);
         let (low, high) = (a.min(b).min(c) - self.slack, a.max(b).max(c) + self.slack);
         [low.as_vec2(), high.as_vec2()]
     }
 
     /// The weight at a place of a cell, if it lies within the cell's range.
-    fn weight(&self, uv: Vec2, cell: Cell, Range { min, max }: Range) -> Result<f32, Fault> {
+    fn weight(&self, uv: Vec2, cell: LatticeCell, TexelRange { min, max }: TexelRange) -> Result<f32, Fault> {
         let weight = self.function.weight(uv);
         if weight >= min - TOLERANCE * max && weight <= max + TOLERANCE * max {
             Ok(weight)
@@ -182,17 +181,17 @@ impl<'a> FunctionOn<'a> {
     }
 }
 
-impl Source for FunctionOn<'_> {
+impl WeightSource for FunctionOnTriangle<'_> {
     type Fault = Fault;
 
-    fn range(&self, cell: Cell, _: bool) -> Result<Range, Fault> {
+    fn range(&self, cell: LatticeCell, _: bool) -> Result<TexelRange, Fault> {
         let region = self.region(cell);
         let [min, max] = self.function.bounds(region[0], region[1]);
         // NaN fails every comparison.
         if !(min >= 0.0 && min <= max && max < f32::INFINITY) {
             return Err(Fault { region, bounds: [min, max], weight: None });
         }
-        let range = Range { min, max };
+        let range = TexelRange { min, max };
         if range.is_constant() {
             // It is never asked again for: one look whether that is true.
             let [a, b, c] = self.cell_corners(cell);
@@ -202,19 +201,14 @@ impl Source for FunctionOn<'_> {
     }
 
     /// The mean of the weights at the middles of the cell's parts.
-    fn average(&self, cell: Cell, range: Range) -> Result<f32, Fault> {
+    fn average(&self, cell: LatticeCell, range: TexelRange) -> Result<f32, Fault> {
         if range.is_constant() {
             return Ok(storable(f64::from(range.max)));
         }
         let [a, b, c] = self.cell_corners(cell);
         let mut sum = 0.0;
-        for i in 0..SUBDIVISION {
-            for j in 0..SUBDIVISION - i {
-                for third in 1..=(2 - u32::from(i + j == SUBDIVISION - 1)) {
-                    let [b1, b2] = [i, j].map(|i| f64::from(3 * i + third) / f64::from(3 * SUBDIVISION));
-                    sum += f64::from(self.weight((a + b1 * (b - a) + b2 * (c - a)).as_vec2(), cell, range)?);
-                }
-            }
+        for [b1, b2] in subdivision_centers(SUBDIVISION) {
+            sum += f64::from(self.weight((a + b1 * (b - a) + b2 * (c - a)).as_vec2(), cell, range)?);
         }
         let mean = sum / f64::from(SUBDIVISION * SUBDIVISION);
         let [min, max] = [range.min, range.max].map(f64::from);

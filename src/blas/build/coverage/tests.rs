@@ -2,22 +2,22 @@ use alloc::vec::Vec;
 use glam::Vec2;
 
 use super::*;
-use crate::blas::barycentric::Cell;
-use crate::blas::footprint::Chart;
-use crate::blas::texture::Texture;
-use crate::blas::touched::range;
+use crate::blas::barycentric::LatticeCell;
+use crate::blas::build::footprint::UvTriangle;
+use crate::blas::build::texture::Texture;
+use crate::blas::build::touched::range;
 use crate::record::Wrap;
 use crate::testing::Pcg32;
 
 const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 
-fn average_of(prepared: &Prepared<'_>, uv: [Vec2; 3]) -> (f64, Range) {
-    let footprint = Chart::new(prepared.texture(), uv).footprint(Cell::root());
+fn average_of(prepared: &TexturePyramid<'_>, uv: [Vec2; 3]) -> (f64, TexelRange) {
+    let footprint = UvTriangle::new(prepared.texture(), uv).footprint(LatticeCell::whole());
     let range = range(prepared, &footprint, true);
     (f64::from(average(prepared, &footprint, range)), range)
 }
 
-/// Look-ups at the centres of `n²` cells: mean, least and greatest.
+/// Lookups at the centers of `n²` cells: mean, least and greatest.
 fn brute_force(texture: &Texture<'_>, uv: [Vec2; 3], n: u32) -> (f64, f64, f64) {
     let [w, h] = texture.size().map(f64::from);
     let [a, b, c] = uv.map(|p| [f64::from(p.x) * w, f64::from(p.y) * h]);
@@ -45,7 +45,7 @@ fn random_uv(rng: &mut Pcg32, scale: f32) -> [Vec2; 3] {
 }
 
 fn compare(texture: Texture<'_>, uv: [Vec2; 3], tolerance: f64) {
-    let prepared = Prepared::new(texture);
+    let prepared = TexturePyramid::new(texture);
     let (found, range) = average_of(&prepared, uv);
     let (mean, min, max) = brute_force(&texture, uv, 160);
     let spread = f64::from(range.max - range.min);
@@ -57,7 +57,7 @@ fn compare(texture: Texture<'_>, uv: [Vec2; 3], tolerance: f64) {
 }
 
 #[test]
-fn averages_are_those_of_many_look_ups() {
+fn averages_are_those_of_many_lookups() {
     let mut rng = Pcg32::new(5, 5);
     for round in 0..300 {
         let (w, h) = (1 + rng.below(9) as usize, 1 + rng.below(9) as usize);
@@ -66,8 +66,8 @@ fn averages_are_those_of_many_look_ups() {
         let scale = [0.3, 0.6, 1.7][round % 7 % 3];
         let uv = random_uv(&mut rng, scale);
         let texture = Texture::new(w, h, &image).unwrap().wrap(u, v);
-        // Beyond, look-ups in blocks stand in for texels; of images as small as these, they are few.
-        if texels(&Chart::new(&texture, uv).footprint(Cell::root())) <= EXACT_TEXELS {
+        // Beyond, lookups in blocks stand in for texels; of images as small as these, they are few.
+        if texels(&UvTriangle::new(&texture, uv).footprint(LatticeCell::whole())) <= EXACT_TEXELS {
             compare(texture, uv, 2e-3);
             compare(texture.filter(Filter::Nearest), uv, 2e-2);
         }
@@ -79,13 +79,13 @@ fn averages_are_those_of_many_look_ups() {
 
 #[test]
 fn a_small_cell_is_integrated_to_rounding() {
-    // Between the four texel centres the image is x + y, so that its mean over the lower half is 2/3.
+    // Between the four texel centers the image is x + y, so that its mean over the lower half is 2/3.
     let texels = [0.0, 1.0, 1.0, 2.0];
-    let prepared = Prepared::new(Texture::new(2, 2, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
+    let prepared = TexturePyramid::new(Texture::new(2, 2, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
     let uv = [Vec2::new(0.25, 0.25), Vec2::new(0.75, 0.25), Vec2::new(0.25, 0.75)];
     assert!((average_of(&prepared, uv).0 - 2.0 / 3.0).abs() < 1e-7);
     // Nearest: a quarter of a texel holds 0, two eighths hold 1.
-    let prepared = Prepared::new(prepared.texture().filter(Filter::Nearest));
+    let prepared = TexturePyramid::new(prepared.texture().filter(Filter::Nearest));
     assert!((average_of(&prepared, uv).0 - 0.5).abs() < 1e-7);
 }
 
@@ -108,8 +108,17 @@ fn a_bright_texel_far_away_costs_no_precision() {
     let mut texels = [1e-3f32; 64 * 64];
     texels[63] = f32::MAX;
     for at in [16.0, 32.0] {
-        let prepared = Prepared::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
+        let prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
         let uv = [Vec2::new(0.0, 0.9), Vec2::new(at / 64.0, 0.9), Vec2::new(0.0, 0.2)];
         assert!((average_of(&prepared, uv).0 - 1e-3).abs() < 1e-9);
     }
+}
+
+#[test]
+fn weights_of_a_half_square() {
+    let half = Polygon::new([[2.0, 3.0], [3.0, 3.0], [2.0, 4.0]]);
+    let [w00, w10, w01, w11] = bilinear_weights(&half, [2.0, 3.0]);
+    assert!((w11 - 1.0 / 24.0).abs() < 1e-15);
+    assert!((w10 - 1.0 / 8.0).abs() < 1e-15 && (w01 - 1.0 / 8.0).abs() < 1e-15);
+    assert!((w00 + w10 + w01 + w11 - 0.5).abs() < 1e-15);
 }

@@ -1,4 +1,4 @@
-//! The weight image that a host hands in.
+//! The weight image that a host passes in.
 
 use crate::error::{Error, Kind};
 use crate::math::floor64;
@@ -26,7 +26,7 @@ pub struct Texture<'a> {
 }
 
 impl<'a> Texture<'a> {
-    /// An image of finite texels that are not negative, with bilinear look-up that repeats along both axes.
+    /// An image of finite texels that are not negative, with bilinear lookup that repeats along both axes.
     ///
     /// # Errors
     ///
@@ -47,7 +47,7 @@ impl<'a> Texture<'a> {
         Ok(Self { width: width as u32, height: height as u32, texels, filter: Filter::default(), wrap })
     }
 
-    /// How the host reads between texel centres.
+    /// How the host reads between texel centers.
     #[must_use]
     pub fn filter(self, filter: Filter) -> Self {
         Self { filter, ..self }
@@ -64,7 +64,7 @@ impl<'a> Texture<'a> {
         [self.width, self.height]
     }
 
-    /// How the host reads between texel centres.
+    /// How the host reads between texel centers.
     pub(crate) fn filtering(&self) -> Filter {
         self.filter
     }
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn look_up() {
+    fn lookup() {
         let texels = [1.0, 3.0];
         let nearest = Texture::new(2, 1, &texels).unwrap().filter(Filter::Nearest);
         assert_eq!([nearest.value(0.49, 0.5), nearest.value(0.5, 0.5), nearest.value(1.0, 7.0)], [1.0, 3.0, 1.0]);

@@ -2,12 +2,15 @@
 
 use alloc::vec::Vec;
 
-use crate::blas::build::BYTES_PER_IMAGE;
-use crate::blas::texture::Texture;
+use crate::blas::build::texture::Texture;
+
+/// Memory for edges between the few large texels of a small image. All its triangles share it: the first ones take what
+/// they need.
+pub(super) const BYTES_PER_IMAGE: f64 = (1 << 18) as f64;
 
 /// What is known of a block of texels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Block {
+pub(crate) struct TexelBlock {
     /// The darkest texel.
     pub(crate) min: f32,
     /// The brightest texel.
@@ -18,21 +21,21 @@ pub(crate) struct Block {
 
 /// One texture with its pyramid. Level `l` has blocks of `2^l` texels to a side; level 0 is the image itself.
 #[derive(Clone, Debug)]
-pub(crate) struct Prepared<'a> {
+pub(crate) struct TexturePyramid<'a> {
     texture: Texture<'a>,
     /// From level 1 up to the one that is a single block.
-    levels: Vec<Level>,
+    levels: Vec<PyramidLevel>,
     /// Bytes that trees over this image may still take beyond two a texel.
     pub(super) extra: f64,
 }
 
 #[derive(Clone, Debug)]
-struct Level {
+struct PyramidLevel {
     size: [u32; 2],
-    blocks: Vec<Block>,
+    blocks: Vec<TexelBlock>,
 }
 
-impl<'a> Prepared<'a> {
+impl<'a> TexturePyramid<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
         let mut prepared = Self { texture, levels: Vec::new(), extra: BYTES_PER_IMAGE };
@@ -47,13 +50,13 @@ impl<'a> Prepared<'a> {
                 }
             }
             size = [w, h];
-            prepared.levels.push(Level { size, blocks });
+            prepared.levels.push(PyramidLevel { size, blocks });
         }
         prepared
     }
 
     /// The block above up to four blocks of the level `below`, which has `size` blocks.
-    fn merge(&self, below: u32, x: u32, y: u32, size: [u32; 2]) -> Block {
+    fn merge(&self, below: u32, x: u32, y: u32, size: [u32; 2]) -> TexelBlock {
         let [w, h] = self.texture.size();
         let texels_along = |i: u32, n: u32| f64::from((n - (i << below)).min(1 << below));
         let (mut min, mut max) = (f32::INFINITY, 0.0f32);
@@ -68,7 +71,7 @@ impl<'a> Prepared<'a> {
                 count += texels;
             }
         }
-        Block { min, max, mean: (sum / count) as f32 }
+        TexelBlock { min, max, mean: (sum / count) as f32 }
     }
 
     /// The texture itself.
@@ -77,10 +80,10 @@ impl<'a> Prepared<'a> {
     }
 
     /// A block of a level from 0 to [`Self::top`].
-    pub(crate) fn block(&self, level: u32, x: u32, y: u32) -> Block {
+    pub(crate) fn block(&self, level: u32, x: u32, y: u32) -> TexelBlock {
         if level == 0 {
             let value = self.texture.texel(x, y);
-            Block { min: value, max: value, mean: value }
+            TexelBlock { min: value, max: value, mean: value }
         } else {
             let level = &self.levels[level as usize - 1];
             level.blocks[y as usize * level.size[0] as usize + x as usize]
@@ -93,7 +96,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// The whole image.
-    pub(crate) fn whole(&self) -> Block {
+    pub(crate) fn whole(&self) -> TexelBlock {
         self.block(self.top(), 0, 0)
     }
 }
@@ -108,7 +111,7 @@ mod tests {
         let mut rng = Pcg32::new(1, 1);
         for (w, h) in [(1, 1), (1, 37), (5, 3), (64, 64), (33, 7)] {
             let texels: Vec<f32> = (0..w * h).map(|_| rng.next_f32()).collect();
-            let prepared = Prepared::new(Texture::new(w, h, &texels).unwrap());
+            let prepared = TexturePyramid::new(Texture::new(w, h, &texels).unwrap());
             let whole = prepared.whole();
             let mean = texels.iter().map(|&t| f64::from(t)).sum::<f64>() / texels.len() as f64;
             assert_eq!(whole.min, texels.iter().copied().fold(f32::INFINITY, f32::min));
@@ -120,6 +123,6 @@ mod tests {
     #[test]
     fn the_largest_values_do_not_overflow() {
         let texels = [f32::MAX; 16];
-        assert_eq!(Prepared::new(Texture::new(4, 4, &texels).unwrap()).whole().mean, f32::MAX);
+        assert_eq!(TexturePyramid::new(Texture::new(4, 4, &texels).unwrap()).whole().mean, f32::MAX);
     }
 }

@@ -2,31 +2,32 @@
 
 use alloc::vec::Vec;
 
-use crate::blas::barycentric::{ARITY, Cell};
-use crate::blas::coverage::storable;
-use crate::blas::touched::Range;
+use crate::blas::barycentric::{ARITY, LatticeCell};
+use crate::blas::build::touched::TexelRange;
+use crate::blas::node::{CELLS, CellBlock, LEAF, Root, append, end, storable};
+use crate::error::{Error, Kind};
+use crate::parallel;
 
-/// From this number of cells on, they are looked at in parallel.
-#[cfg(feature = "rayon")]
-const PARALLEL: usize = 256;
+/// From this number of cells on, they are looked at side by side.
+const WORTHWHILE_CELLS: usize = 256;
 
 /// The weights over a triangle.
-pub(crate) trait Source: Sync {
+pub(crate) trait WeightSource: Sync {
     /// What may be wrong with them.
     type Fault: Send;
 
     /// Their ends over a cell. With `exact` false it is enough that a range which is not constant is found not to be.
-    fn range(&self, cell: Cell, exact: bool) -> Result<Range, Self::Fault>;
+    fn range(&self, cell: LatticeCell, exact: bool) -> Result<TexelRange, Self::Fault>;
 
     /// Their average over a cell of that range.
-    fn average(&self, cell: Cell, range: Range) -> Result<f32, Self::Fault>;
+    fn average(&self, cell: LatticeCell, range: TexelRange) -> Result<f32, Self::Fault>;
 
     /// Their variance over a small cell, as a share of what two values at the ends of its range would have.
     fn spread(&self) -> f64;
 }
 
 /// How far a tree may grow.
-pub(crate) struct Limits {
+pub(crate) struct GrowthLimits {
     /// Most nodes; one at least.
     pub(crate) nodes: usize,
     /// From this level on, cells are fine: there must be a reason to divide them.
@@ -39,7 +40,7 @@ pub(crate) struct Limits {
 }
 
 /// A tree before it is packed.
-pub(crate) struct Tree {
+pub(crate) struct GrownTree {
     /// That of the whole triangle.
     pub(crate) average: f32,
     /// Those of all cells, node by node, breadth first.
@@ -48,26 +49,45 @@ pub(crate) struct Tree {
     pub(crate) divided: Vec<bool>,
 }
 
+impl GrownTree {
+    /// Adds the tree to the pool. Returns its root and the bytes that it takes.
+    pub(super) fn store(&self, pool: &mut Vec<CellBlock>) -> Result<(Root, f64), Error> {
+        if self.divided.is_empty() || self.average == 0.0 {
+            return Ok((Root::constant(self.average), 0.0));
+        }
+        let count = end(pool, self.divided.len() / ARITY);
+        if count >= LEAF as usize {
+            return Err(Error(Kind::TooMany { what: "BLAS nodes", count, limit: LEAF as usize }));
+        }
+        let bytes = self.averages.len().div_ceil(CELLS) * size_of::<CellBlock>();
+        Ok((Root { average: self.average, node: append(pool, &self.averages, &self.divided) }, bytes as f64))
+    }
+}
+
 /// A cell of which it is not yet known whether it is divided.
-struct Open {
-    cell: Cell,
-    range: Range,
+struct OpenCell {
+    cell: LatticeCell,
+    range: TexelRange,
     /// Its place in the tree.
     at: usize,
 }
 
 /// A cell that could be a leaf.
-struct Measured {
+struct MeasuredCell {
     average: f32,
     /// Estimate of what its contrast adds to the variance, for a cell of unit area.
     variance: f64,
 }
 
-/// Grows the tree of a triangle in which look-ups are not all the same. It has no nodes if that is not worth one.
-pub(crate) fn grow<S: Source>(source: &S, range: Range, limits: &Limits) -> Result<Tree, S::Fault> {
+/// Grows the tree of a triangle in which lookups are not all the same. It has no nodes if that is not worth one.
+pub(crate) fn grow<S: WeightSource>(
+    source: &S,
+    range: TexelRange,
+    limits: &GrowthLimits,
+) -> Result<GrownTree, S::Fault> {
     // The whole triangle stands in front, as the only cell of a node before the first.
-    let mut growing = Growing { source, averages: alloc::vec![0.0], divided: alloc::vec![false], mass: 0.0 };
-    let mut open = alloc::vec![Open { cell: Cell::root(), range, at: 0 }];
+    let mut growing = TreeGrowth { source, averages: alloc::vec![0.0], divided: alloc::vec![false], mass: 0.0 };
+    let mut open = alloc::vec![OpenCell { cell: LatticeCell::whole(), range, at: 0 }];
     let (mut nodes, mut level, mut share) = (0, 0, 1.0);
     while !open.is_empty() {
         let room = if level == limits.deepest { 0 } else { limits.nodes - nodes };
@@ -81,7 +101,7 @@ pub(crate) fn grow<S: Source>(source: &S, range: Range, limits: &Limits) -> Resu
     Ok(growing.finish())
 }
 
-struct Growing<'a, S> {
+struct TreeGrowth<'a, S> {
     source: &'a S,
     averages: Vec<f32>,
     divided: Vec<bool>,
@@ -89,23 +109,29 @@ struct Growing<'a, S> {
     mass: f64,
 }
 
-impl<S: Source> Growing<'_, S> {
+impl<S: WeightSource> TreeGrowth<'_, S> {
     /// The relative variance of sampling by averages is the sum of variance over mean. Ends of the range bound the
     /// variance (Bhatia and Davis 2000); with two values, and that is what edges have, the bound is exact.
-    fn measure(&self, open: &Open, is_exact: bool) -> Result<Measured, S::Fault> {
+    fn measure(&self, open: &OpenCell, is_exact: bool) -> Result<MeasuredCell, S::Fault> {
         let range = if is_exact { open.range } else { self.source.range(open.cell, true)? };
         let average = self.source.average(open.cell, range)?;
         let [min, max, mean] = [range.min, range.max, average].map(f64::from);
-        Ok(Measured { average, variance: self.source.spread() * (max - mean) * (mean - min) / mean })
+        Ok(MeasuredCell { average, variance: self.source.spread() * (max - mean) * (mean - min) / mean })
     }
 
     /// The cells that are to be divided, in their order; the others become leaves. Of fine cells those may stay that
     /// together add no more than `spare` to the variance.
-    fn choose(&mut self, open: Vec<Open>, room: usize, spare: Option<f64>, share: f64) -> Result<Vec<Open>, S::Fault> {
+    fn choose(
+        &mut self,
+        open: Vec<OpenCell>,
+        room: usize,
+        spare: Option<f64>,
+        share: f64,
+    ) -> Result<Vec<OpenCell>, S::Fault> {
         if spare.is_none() && open.len() <= room {
             return Ok(open);
         }
-        let measured = map(&open, |open| self.measure(open, spare.is_some()))?;
+        let measured = parallel::map(&open, WORTHWHILE_CELLS, |open| self.measure(open, spare.is_some()))?;
         let mass = self.mass + share * measured.iter().map(|m| f64::from(m.average)).sum::<f64>();
         let mut ranks: Vec<(f64, usize)> = measured.iter().map(|m| m.variance).zip(0..).collect();
         ranks.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -126,9 +152,9 @@ impl<S: Source> Growing<'_, S> {
         Ok(open.into_iter().zip(is_kept).filter_map(|(open, is_kept)| is_kept.then_some(open)).collect())
     }
 
-    /// Adds the nodes below cells. Returns those of their cells over which look-ups differ.
-    fn divide(&mut self, open: Vec<Open>, exact: bool, share: f64) -> Result<Vec<Open>, S::Fault> {
-        let children: Vec<[(Cell, Range); ARITY]> = map(&open, |open| {
+    /// Adds the nodes below cells. Returns those of their cells over which lookups differ.
+    fn divide(&mut self, open: Vec<OpenCell>, exact: bool, share: f64) -> Result<Vec<OpenCell>, S::Fault> {
+        let children: Vec<[(LatticeCell, TexelRange); ARITY]> = parallel::map(&open, WORTHWHILE_CELLS, |open| {
             let mut children = [(open.cell, open.range); ARITY];
             for (slot, (cell, range)) in children.iter_mut().enumerate() {
                 *cell = open.cell.child(slot);
@@ -146,7 +172,7 @@ impl<S: Source> Growing<'_, S> {
                 if range.is_constant() {
                     self.set(at, storable(f64::from(range.max)), share);
                 } else {
-                    next.push(Open { cell, range, at });
+                    next.push(OpenCell { cell, range, at });
                 }
             }
         }
@@ -159,7 +185,7 @@ impl<S: Source> Growing<'_, S> {
     }
 
     /// Sets the average of every divided cell to the mean of its node.
-    fn finish(mut self) -> Tree {
+    fn finish(mut self) -> GrownTree {
         let mut end = self.averages.len();
         for at in (0..self.averages.len()).rev() {
             if self.divided[at] {
@@ -170,18 +196,6 @@ impl<S: Source> Growing<'_, S> {
             }
         }
         let average = self.averages[0];
-        Tree { average, averages: self.averages.split_off(1), divided: self.divided.split_off(1) }
+        GrownTree { average, averages: self.averages.split_off(1), divided: self.divided.split_off(1) }
     }
-}
-
-/// Maps all items, in parallel with the feature `rayon`. Each one is mapped alone, and the order stays: the result does
-/// not depend on the number of threads, and what fails first in this order is the fault that is returned.
-fn map<T: Sync, R: Send, F: Send>(items: &[T], map: impl Fn(&T) -> Result<R, F> + Sync + Send) -> Result<Vec<R>, F> {
-    #[cfg(feature = "rayon")]
-    if items.len() >= PARALLEL {
-        use rayon::prelude::*;
-        let mapped: Vec<Result<R, F>> = items.par_iter().map(map).collect();
-        return mapped.into_iter().collect();
-    }
-    items.iter().map(map).collect()
 }

@@ -6,7 +6,7 @@ use crate::record::Wrap;
 
 /// A stretch of an axis that is a run of the image's texels, forwards, backwards or one texel held.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stretch {
+pub(crate) struct TexelRun {
     /// First texel of the run, in the image.
     pub(crate) first: u32,
     /// Last texel of the run, in the image.
@@ -25,7 +25,7 @@ enum PlaceOnAxis {
     Held(f64, f64),
 }
 
-impl Stretch {
+impl TexelRun {
     /// The interval that the texels `from..=to` of this run cover.
     pub(crate) fn interval(&self, from: u32, to: u32) -> [f64; 2] {
         match self.place {
@@ -40,29 +40,29 @@ impl Stretch {
 const MAX_COPIES: i64 = 4;
 
 /// The stretches of the texels `from..=to` of a wrapped axis of `n` texels. Intervals count from `origin`.
-pub(crate) fn stretches(wrap: Wrap, n: u32, from: i64, to: i64, origin: i64) -> SmallVec<[Stretch; 4]> {
+pub(crate) fn stretches(wrap: Wrap, n: u32, from: i64, to: i64, origin: i64) -> SmallVec<[TexelRun; 4]> {
     let size = i64::from(n);
     let relative = |index: i64| (index - origin) as f64;
     let mut out = SmallVec::new();
     if wrap == Wrap::Clamp {
         if from < 0 {
             let place = PlaceOnAxis::Held(relative(from), relative(0.min(to + 1)));
-            out.push(Stretch { first: 0, last: 0, place });
+            out.push(TexelRun { first: 0, last: 0, place });
         }
         if from < size && to >= 0 {
             let (first, last) = (from.max(0) as u32, to.min(size - 1) as u32);
-            out.push(Stretch { first, last, place: PlaceOnAxis::Forward(relative(0)) });
+            out.push(TexelRun { first, last, place: PlaceOnAxis::Forward(relative(0)) });
         }
         if to >= size {
             let place = PlaceOnAxis::Held(relative(size.max(from)), relative(to + 1));
-            out.push(Stretch { first: n - 1, last: n - 1, place });
+            out.push(TexelRun { first: n - 1, last: n - 1, place });
         }
         return out;
     }
     let (first_copy, last_copy) = (from.div_euclid(size), to.div_euclid(size));
     if last_copy - first_copy >= MAX_COPIES {
         let place = PlaceOnAxis::Held(relative(from), relative(to + 1));
-        out.push(Stretch { first: 0, last: n - 1, place });
+        out.push(TexelRun { first: 0, last: n - 1, place });
         return out;
     }
     for copy in first_copy..=last_copy {
@@ -70,9 +70,9 @@ pub(crate) fn stretches(wrap: Wrap, n: u32, from: i64, to: i64, origin: i64) -> 
         let (a, b) = ((from - start).max(0) as u32, (to - start).min(size - 1) as u32);
         out.push(if wrap == Wrap::Mirror && copy.rem_euclid(2) == 1 {
             let place = PlaceOnAxis::Backward(relative(start + size - 1));
-            Stretch { first: n - 1 - b, last: n - 1 - a, place }
+            TexelRun { first: n - 1 - b, last: n - 1 - a, place }
         } else {
-            Stretch { first: a, last: b, place: PlaceOnAxis::Forward(relative(start)) }
+            TexelRun { first: a, last: b, place: PlaceOnAxis::Forward(relative(start)) }
         });
     }
     out
@@ -81,11 +81,11 @@ pub(crate) fn stretches(wrap: Wrap, n: u32, from: i64, to: i64, origin: i64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blas::texture::wrap_index;
+    use crate::blas::build::texture::wrap_index;
 
-    /// Every texel of the range is in one stretch, as the texel that the look-up finds.
+    /// Every texel of the range is in one stretch, as the texel that the lookup finds.
     #[test]
-    fn stretches_agree_with_the_look_up() {
+    fn stretches_agree_with_the_lookup() {
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             for n in [1, 2, 5] {
                 for from in -9..9 {
@@ -93,11 +93,11 @@ mod tests {
                         let found = stretches(wrap, n, from, to, -3);
                         for index in from..=to {
                             let texel = wrap_index(wrap, index, n);
-                            let centre = (index + 3) as f64 + 0.5;
-                            let holds = |s: &&Stretch| {
+                            let center = (index + 3) as f64 + 0.5;
+                            let holds = |s: &&TexelRun| {
                                 (s.first..=s.last).contains(&texel) && {
                                     let [lo, hi] = s.interval(texel, texel);
-                                    lo < centre && centre < hi
+                                    lo < center && center < hi
                                 }
                             };
                             assert_eq!(found.iter().filter(holds).count(), 1, "{wrap:?} {n} {from} {to} {index}");

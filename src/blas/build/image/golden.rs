@@ -15,8 +15,8 @@ fn quad() -> [[Vec2; 3]; 2] {
 #[test]
 fn golden() {
     let texels = spots(64);
-    let mut prepared = Prepared::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
-    let mut pool = Vec::<Block>::new();
+    let mut prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
+    let mut pool = Vec::<CellBlock>::new();
     let roots = quad().map(|uv| build(&mut prepared, uv, &mut pool).unwrap());
     // FNV-1a.
     let hash = |bytes: &[u8]| {
@@ -36,12 +36,12 @@ fn golden() {
 /// Eight bright discs on a dark ground.
 fn spots(n: usize) -> Vec<f32> {
     let mut rng = Pcg32::new(7, 7);
-    let centres: [[f32; 2]; 8] = core::array::from_fn(|_| [rng.next_f32(), rng.next_f32()]);
+    let centers: [[f32; 2]; 8] = core::array::from_fn(|_| [rng.next_f32(), rng.next_f32()]);
     let at = |i: usize| (i as f32 + 0.5) / n as f32;
     (0..n * n)
         .map(|i| {
             let (x, y) = (at(i % n), at(i / n));
-            let inside = centres.iter().any(|c| (x - c[0]).powi(2) + (y - c[1]).powi(2) < 0.02 * 0.02);
+            let inside = centers.iter().any(|c| (x - c[0]).powi(2) + (y - c[1]).powi(2) < 0.02 * 0.02);
             if inside { 100.0 } else { 0.05 }
         })
         .collect()

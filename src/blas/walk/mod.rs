@@ -1,0 +1,11 @@
+//! Descends from a triangle to a cell of its barycentric domain.
+
+mod cell;
+mod descend;
+mod guide;
+mod target;
+
+pub(crate) use cell::{at_corners, centers, child_corners};
+pub(crate) use descend::{descend, descend_below};
+pub(crate) use guide::{Draw, Follow, Guide};
+pub(crate) use target::{CellTarget, CellWeight, CellWeights, TextureChildren};
