@@ -118,6 +118,17 @@ pub(crate) const fn position(index: usize) -> CellPosition {
     CellPosition { a: [r - 1 - row, row - a2 - column % 2, a2], inverted }
 }
 
+/// The positions of all cells of a node.
+static POSITIONS: [CellPosition; ARITY] = {
+    let mut positions = [position(0); ARITY];
+    let mut index = 1;
+    while index < ARITY {
+        positions[index] = position(index);
+        index += 1;
+    }
+    positions
+};
+
 /// A cell of any depth: how its own coordinates map to those of the whole triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct LatticeCell {
@@ -139,7 +150,7 @@ impl LatticeCell {
     /// One of the cells of this one. `index` is below [`ARITY`].
     #[inline]
     pub(crate) fn child(self, index: usize) -> Self {
-        let CellPosition { a, inverted } = position(index);
+        let CellPosition { a, inverted } = POSITIONS[index];
         let size = self.size >> LEVEL_HALVINGS;
         let mut offset = self.offset;
         for (o, a) in offset.iter_mut().zip(a) {

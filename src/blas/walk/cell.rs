@@ -54,15 +54,25 @@ const fn corner_weights(CellPosition { a, inverted }: CellPosition, k: usize) ->
     weights
 }
 
+/// Barycentrics of the children's corners in the cell, by child and corner.
+static CORNER_WEIGHTS: [[[f32; 3]; 3]; ARITY] = {
+    let mut weights = [[[0.0; 3]; 3]; ARITY];
+    let mut index = 0;
+    while index < ARITY {
+        let mut k = 0;
+        while k < 3 {
+            weights[index][k] = corner_weights(position(index), k);
+            k += 1;
+        }
+        index += 1;
+    }
+    weights
+};
+
 /// The corners of a child of a cell with these corners.
 #[inline]
 pub(crate) fn child_corners(&[v0, v1, v2]: &[Vec3; 3], index: usize) -> [Vec3; 3] {
-    let position = position(index);
-    let corner = |k| {
-        let [p0, p1, p2] = corner_weights(position, k);
-        v0 * p0 + v1 * p1 + v2 * p2
-    };
-    [corner(0), corner(1), corner(2)]
+    CORNER_WEIGHTS[index].map(|[p0, p1, p2]| v0 * p0 + v1 * p1 + v2 * p2)
 }
 
 /// Interpolates between three values.

@@ -39,7 +39,10 @@ impl Guide for Draw {
     #[inline]
     fn choose(&mut self, weights: &[f32; ARITY]) -> usize {
         const GROUP: usize = EDGE_CELLS as usize;
-        let groups: [f32; GROUP] = core::array::from_fn(|i| weights[i * GROUP..][..GROUP].iter().sum());
+        let mut groups = [0.0; GROUP];
+        for (group, members) in groups.iter_mut().zip(weights.chunks_exact(GROUP)) {
+            *group = members.iter().sum();
+        }
         let group = pick(&groups, sum(&groups), &mut self.u[1]);
         let members = &weights[group * GROUP..][..GROUP];
         group * GROUP + pick(members, sum(members), &mut self.u[0])
