@@ -34,7 +34,7 @@ pub(crate) const CELLS: usize = 32;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct CellBlock([u32; 2 + CELLS / 4]);
 
-const _: () = assert!(size_of::<CellBlock>() == 40 && CELLS % ARITY == 0);
+const _: () = assert!(size_of::<CellBlock>() == 40 && CELLS / ARITY * ARITY == CELLS);
 
 impl CellBlock {
     #[inline(always)]
