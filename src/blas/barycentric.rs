@@ -5,25 +5,25 @@
 //! point finds, at every depth, on edges and corners too.
 //!
 //! The numbering is Ogaki's: with [`ARITY`] `M`, `R = √M` and `βk = min(R - 1, ⌊(1 - bk) R⌋)`, the index is
-//! `β0² + (β1 - β2) + β0`. Rows are numbered from vertex 0; row `r` holds `2 r + 1` cells, by turns upright and
-//! inverted. An upright cell has the corners of the whole triangle in the same order; an inverted one is turned by
-//! half a circle, corner `k` lying across from the edge that would be edge `k`. In its own coordinates an inverted
-//! cell is a triangle like any other, so that the next level does not see the difference.
+//! `β0² + (β1 - β2) + β0`. Rows are numbered from vertex 0; row `r` holds `2 r + 1` cells, upright and inverted ones
+//! alternating. An upright cell has the corners of the whole triangle in the same order; an inverted one is turned by
+//! half a circle, corner `k` lying across from the edge that would be edge `k`. In its own coordinates an inverted cell
+//! is a triangle like any other, so that the next level does not see the difference.
 
 use crate::warp::triangle::square_to_triangle;
 
-/// Bits of a lattice coordinate.
+/// Bits of a lattice coordinate. *Format*: those of an `f32`'s mantissa, so that coordinates are exact.
 pub(crate) const LATTICE_BITS: u32 = 24;
 
 /// The sum of a point's three coordinates: the edge length of the whole triangle in lattice units.
 pub(crate) const LATTICE: u32 = 1 << LATTICE_BITS;
 
-/// How often the whole triangle's edge may be halved. A level halves it [`LEVEL_HALVINGS`] times.
+/// How often the whole triangle's edge may be halved. *Proved*: see below. A level halves it [`LEVEL_HALVINGS`] times.
 ///
 /// The smallest cell is 16 lattice units wide and still has points strictly inside.
 pub(crate) const MAX_DEPTH: u32 = 20;
 
-/// Cells of a node.
+/// Cells of a node. *Format*: it decides on the layout of [`CellBlock`](super::node::CellBlock).
 pub(crate) const ARITY: usize = 4;
 
 /// Cells along one edge of a node.
@@ -66,7 +66,8 @@ impl Lattice {
 
 /// Which of a node's cells holds a point, and the point's coordinates in that cell.
 ///
-/// `local` sums to `size`, a power of two and a multiple of [`EDGE_CELLS`]; the returned coordinates sum to `size / EDGE_CELLS`.
+/// `local` sums to `size`, a power of two and a multiple of [`EDGE_CELLS`]; the returned coordinates sum to
+/// `size / EDGE_CELLS`.
 /// Every point has exactly one index; one strictly inside of a cell has that cell's.
 #[inline]
 pub(crate) fn child(local: [u32; 3], size: u32) -> (usize, [u32; 3]) {

@@ -1,17 +1,17 @@
 //! What a BLAS is made of: plain data, in one pool for all triangles of a sampler.
 //!
 //! A node is [`ARITY`] cells in the order of [`barycentric::child`](crate::blas::barycentric::child); node `i` owns the
-//! cells from `i ARITY` on. The nodes of a tree are numbered breadth first, so that the nodes below the cells of a block
-//! have successive numbers, and a bit a cell tells them all (Jacobson 1989, level-order unary degree sequence).
+//! cells from `i ARITY` on. The nodes of a tree are numbered breadth first, so that the nodes below the cells of a
+//! block have successive numbers, and a bit a cell tells them all (Jacobson 1989, level-order unary degree sequence).
 
 use alloc::vec::Vec;
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::blas::barycentric::ARITY;
-use crate::blas::code::{LARGEST, decode, encode};
+use crate::blas::code::{LARGEST_VALUE, decode, encode};
 
-/// Stands for "no node below": the weight is taken for constant over the cell.
+/// *Format*: stands for "no node below": the weight is taken for constant over the cell.
 pub(crate) const LEAF: u32 = u32::MAX;
 
 /// The largest average that is stored. *Proved*: larger ones only steer sampling, and a sum of 2^26 of them stays below
@@ -23,8 +23,8 @@ pub(crate) fn storable(value: f64) -> f32 {
     if value > 0.0 { (value as f32).clamp(f32::MIN_POSITIVE, MAX_AVERAGE) } else { 0.0 }
 }
 
-/// Cells of a block. A tree starts at the first cell of one.
-pub(crate) const CELLS: usize = 32;
+/// Cells of a block. A tree starts at the first cell of one. *Format*: as many as a word has bits.
+pub(crate) const BLOCK_CELLS: usize = 32;
 
 /// Successive cells: eight nodes.
 ///
@@ -32,14 +32,14 @@ pub(crate) const CELLS: usize = 32;
 /// others are the [codes](crate::blas::code) of the average weights over the cells.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub(crate) struct CellBlock([u32; 2 + CELLS / 4]);
+pub(crate) struct CellBlock([u32; 2 + BLOCK_CELLS / 4]);
 
-const _: () = assert!(size_of::<CellBlock>() == 40 && CELLS / ARITY * ARITY == CELLS);
+const _: () = assert!(size_of::<CellBlock>() == 40 && BLOCK_CELLS / ARITY * ARITY == BLOCK_CELLS);
 
 impl CellBlock {
     #[inline(always)]
-    fn codes(&self) -> &[u8; CELLS] {
-        let bytes: &[u8; 8 + CELLS] = bytemuck::cast_ref(&self.0);
+    fn codes(&self) -> &[u8; BLOCK_CELLS] {
+        let bytes: &[u8; 8 + BLOCK_CELLS] = bytemuck::cast_ref(&self.0);
         bytes.last_chunk().expect("a block is longer than its codes")
     }
 
@@ -54,7 +54,7 @@ impl CellBlock {
 #[inline(always)]
 pub(crate) fn averages(blocks: &[CellBlock], node: u32) -> [f32; ARITY] {
     let first = node as usize * ARITY;
-    let codes = &blocks[first / CELLS].codes()[first % CELLS..][..ARITY];
+    let codes = &blocks[first / BLOCK_CELLS].codes()[first % BLOCK_CELLS..][..ARITY];
     core::array::from_fn(|i| decode(codes[i]))
 }
 
@@ -62,8 +62,8 @@ pub(crate) fn averages(blocks: &[CellBlock], node: u32) -> [f32; ARITY] {
 #[inline(always)]
 pub(crate) fn below(blocks: &[CellBlock], node: u32, cell: usize) -> u32 {
     let at = node as usize * ARITY + cell;
-    let [divided, first, ..] = blocks[at / CELLS].0;
-    let bit = 1 << (at % CELLS);
+    let [divided, first, ..] = blocks[at / BLOCK_CELLS].0;
+    let bit = 1 << (at % BLOCK_CELLS);
     if divided & bit == 0 { LEAF } else { first.wrapping_add((divided & (bit - 1)).count_ones()) }
 }
 
@@ -98,11 +98,11 @@ pub(crate) fn append(blocks: &mut Vec<CellBlock>, averages: &[f32], divided: &[b
     let root = first_free(blocks);
     let largest = averages.iter().fold(f32::MIN_POSITIVE, |largest, average| largest.max(*average));
     let mut next = root + 1;
-    for (averages, divided) in averages.chunks(CELLS).zip(divided.chunks(CELLS)) {
-        let mut block = CellBlock([0; 2 + CELLS / 4]);
+    for (averages, divided) in averages.chunks(BLOCK_CELLS).zip(divided.chunks(BLOCK_CELLS)) {
+        let mut block = CellBlock([0; 2 + BLOCK_CELLS / 4]);
         block.0[1] = next;
         for (cell, (average, divided)) in averages.iter().zip(divided).enumerate() {
-            let code = encode(average / largest * LARGEST);
+            let code = encode(average / largest * LARGEST_VALUE);
             bytemuck::bytes_of_mut(&mut block.0)[8 + cell] = code;
             block.0[0] |= u32::from(*divided) << cell;
         }
@@ -114,12 +114,12 @@ pub(crate) fn append(blocks: &mut Vec<CellBlock>, averages: &[f32], divided: &[b
 
 /// The number that the next tree's first node gets.
 fn first_free(blocks: &[CellBlock]) -> u32 {
-    (blocks.len() * CELLS / ARITY) as u32
+    (blocks.len() * BLOCK_CELLS / ARITY) as u32
 }
 
 /// The number of nodes in the pool after a tree of `nodes` was appended.
 pub(crate) fn end(blocks: &[CellBlock], nodes: usize) -> usize {
-    blocks.len() * CELLS / ARITY + nodes
+    blocks.len() * BLOCK_CELLS / ARITY + nodes
 }
 
 /// Whether the tree of a root, if there is one, starts in this part of a pool.

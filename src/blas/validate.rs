@@ -3,12 +3,12 @@
 use alloc::vec;
 
 use crate::blas::barycentric::{ARITY, LEVEL_HALVINGS, MAX_DEPTH};
-use crate::blas::node::{CELLS, CellBlock, LEAF, MAX_AVERAGE, Root, averages, below};
+use crate::blas::node::{BLOCK_CELLS, CellBlock, LEAF, MAX_AVERAGE, Root, averages, below};
 use crate::error::Error;
 
 /// Number of nodes that a pool has place for.
 fn node_count(blocks: &[CellBlock]) -> usize {
-    blocks.len() * CELLS / ARITY
+    blocks.len() * BLOCK_CELLS / ARITY
 }
 
 fn is_lit(blocks: &[CellBlock], node: u32) -> bool {
@@ -55,7 +55,7 @@ pub(crate) fn validate(blocks: &[CellBlock]) -> Result<(), Error> {
 
 fn is_divided(blocks: &[CellBlock], node: u32, cell: usize) -> bool {
     let at = node as usize * ARITY + cell;
-    blocks[at / CELLS].divided() >> (at % CELLS) & 1 == 1
+    blocks[at / BLOCK_CELLS].divided() >> (at % BLOCK_CELLS) & 1 == 1
 }
 
 /// Checks the roots into a pool that [`validate`] has passed.

@@ -5,11 +5,11 @@ use crate::warp::triangle::square_to_triangle;
 use crate::warp::{Variate, pick, sum};
 
 /// A square that is cut by three lines has at most seven vertices; rounding could add one.
-const CAPACITY: usize = 8;
+const SQUARE_CAPACITY: usize = 8;
 
 /// The convex rest of a square.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ClippedSquare(Polygon<f32, CAPACITY>);
+pub(super) struct ClippedSquare(Polygon<f32, SQUARE_CAPACITY>);
 
 impl ClippedSquare {
     /// The square of unit side around the origin.
@@ -25,8 +25,8 @@ impl ClippedSquare {
 
     /// Areas of the triangles of the fan around the first vertex.
     #[inline]
-    fn fan(&self) -> [f32; CAPACITY - 2] {
-        let mut areas = [0.0; CAPACITY - 2];
+    fn fan(&self) -> [f32; SQUARE_CAPACITY - 2] {
+        let mut areas = [0.0; SQUARE_CAPACITY - 2];
         for (area, (_, double)) in areas.iter_mut().zip(self.0.fan()) {
             *area = (0.5 * double).max(0.0);
         }

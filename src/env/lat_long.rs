@@ -61,7 +61,7 @@ impl<'a> LatLong<'a> {
     pub(super) fn texel(&self, x: usize, y: usize, size: usize) -> f64 {
         let half = size / 2;
         let (right, top) = (x >= half, y >= half);
-        // Texels from the centre lines.
+        // Texels from the center lines.
         let k = if right { x - half } else { half - 1 - x };
         let l = if top { y - half } else { half - 1 - y };
         // Azimuth runs clockwise in the image, φ = -2πu: the quadrants x, -y and -x, y have u growing with f.

@@ -36,7 +36,9 @@ impl TexelRun {
     }
 }
 
-/// More copies of the image than this are not told apart.
+/// More copies of the image than this are not distinguished.
+///
+/// A budget: more finds constant regions in footprints over more copies, and takes longer.
 const MAX_COPIES: i64 = 4;
 
 /// The stretches of the texels `from..=to` of a wrapped axis of `n` texels. Intervals count from `origin`.

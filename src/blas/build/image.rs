@@ -1,4 +1,4 @@
-//! Builds the BLAS of one triangle: how deep it goes and how much memory it may take.
+//! The tree over an image on one triangle: how deep it goes and how much memory it may take.
 
 use alloc::vec::Vec;
 use core::convert::Infallible;
@@ -12,53 +12,77 @@ use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
 use crate::blas::build::pyramid::{BYTES_PER_IMAGE, TexturePyramid};
 use crate::blas::build::texture::Texture;
 use crate::blas::build::touched::{self, TexelRange};
-use crate::blas::node::{CELLS, CellBlock, Root, storable};
+use crate::blas::node::{BLOCK_CELLS, CellBlock, Root, storable};
 use crate::error::Error;
 use crate::record::{Filter, Wrap};
 
 /// A cell with no more area than this, in texels, is fine if it is short, too.
+///
+/// *Measured* (ACCURACY.md, "Constants of the trees over textures"). Larger changes nothing as long as the length
+/// limits; smaller divides blurred cells of one texel.
 const FINE_AREA: f64 = 1.0;
 
 /// A cell with an edge longer than this, in texels, is not fine.
+///
+/// *Measured* (the same table). Larger leaves edges between texels to [`EXTRA_HALVINGS`]; half of it takes up to three
+/// times the memory.
 const FINE_LENGTH: f64 = 1.5;
 
-/// A fine cell may still be halved so often where its contrast is worth it: along sharp edges between texels, and
-/// where lookup blurs them.
+/// How often a fine cell may be halved where its contrast is worth it: along sharp edges between texels, and where
+/// bilinear lookup blurs them.
+///
+/// *Measured* (the same table). More makes cells along edges smaller and takes memory: with half of each a clip map has
+/// three times the variance, with twice the blurred one it takes seven times the memory.
 const EXTRA_HALVINGS: [u32; 2] = [6, 2];
 
 /// What the contrast of fine cells that are not divided may add to the relative variance.
-const VARIANCE: f64 = 0.003;
+///
+/// *Measured* (the same table). Larger saves memory, and the variance along edges grows with it.
+const IMAGE_VARIANCE: f64 = 0.003;
 
-/// The variance of a ramp, as a share of what two values at its ends would have.
+/// The variance of a ramp, as a share of what two values at its ends would have. Larger divides blurred edges more.
+///
+/// *Proved*: uniform values between 0 and 1 have the variance 1/12, and two values 1/4.
 const RAMP: f64 = 1.0 / 3.0;
 
-/// Memory for each texel that a triangle covers. Where it covers copies of them, each texel counts for a quarter.
+/// Bytes for each texel that a triangle covers. A budget: with half of it noise has 1.25 times the variance, with twice
+/// 0.8 times (ACCURACY.md, "Constants of the trees over textures"). Where it covers copies of them, each texel counts
+/// for a quarter.
 const BYTES_PER_TEXEL: f64 = 2.0;
 
-/// So many copies of texels count as texels of their own.
+/// The number of texels that copies count as at least, however small the image.
+///
+/// A budget. Smaller images have [`BYTES_PER_IMAGE`], which is more.
 const TEXELS_OF_COPIES: f64 = (1 << 15) as f64;
 
-/// Memory for one triangle, at most.
-const MAX_BYTES: f64 = (1 << 22) as f64;
+/// Bytes for one triangle, at most. A budget: it bounds what one large image can take.
+const IMAGE_TREE_BYTES: f64 = (1 << 22) as f64;
 
 /// A triangle that covers fewer texels has no tree. One that covers as many may have a block, whatever it takes.
+///
+/// *Measured* (ACCURACY.md, "Constants of the trees over textures"): with twice the value a triangle over five texels
+/// of noise has nine times the variance; with less, fine meshes take a block of 40 bytes for every triangle.
 const LEAST_TEXELS: f64 = 4.0;
 
-/// With fewer leaves than this to a copy of the image, all averages would be much the same.
+/// With fewer leaves than this for each copy of the image, a triangle is not divided: all averages would be nearly
+/// equal.
+///
+/// A budget: more saves memory where the image repeats thousands of times, less keeps what little a tree tells there.
 const LEAVES_PER_COPY: f64 = 4.0;
 
 /// Adds the BLAS of a triangle with these texture coordinates to the pool.
 ///
 /// A cell is divided until lookups in it are all the same, or until it has at most one texel's area and edges of at
-/// most 1.5 texels; beyond that, up to six times (twice with bilinear lookup), where an edge of the image runs through. A triangle whose memory
-/// runs out divides the cells first that are worth most; the others keep their average. There are two bytes for each
-/// texel that it can see, half a byte (for 2^15 texels at least) where it sees copies of them, more for images of less than 2^17 texels,
-/// and 4 MB in all. If that leaves fewer than four leaves for each copy of the image, the triangle is not divided.
+/// most 1.5 texels; beyond that, up to six times (twice with bilinear lookup), where an edge of the image runs through.
+/// A triangle whose memory runs out divides the cells first that reduce the variance most; the others keep their
+/// average. There are two bytes for each texel that it can see, half a byte (for 2^15 texels at least) where it sees
+/// copies of them, more for images of fewer than 2^17 texels, and 4 MB in all. If that leaves fewer than four leaves
+/// for each copy of the image, the triangle is not divided.
 ///
 /// # Errors
 ///
-/// If a coordinate is not finite or beyond [`UV_LIMIT`](crate::blas::build::footprint::UV_LIMIT) (a caller that knows the
-/// mesh checks first, with [`check_uv`]; here the error says mesh 0), or if the pool has no more indices. The pool
+/// If a coordinate is not finite or beyond [`UV_LIMIT`](crate::blas::build::footprint::UV_LIMIT) (a caller that knows
+/// the mesh checks first, with [`check_uv`]; here the error says mesh 0), or if the pool has no more indices. The pool
 /// is then as it was.
 pub(crate) fn build(
     prepared: &mut TexturePyramid<'_>,
@@ -86,7 +110,7 @@ pub(crate) fn build(
     let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_DEPTH / LEVEL_HALVINGS);
     debug_assert!(LATTICE >> (deepest * LEVEL_HALVINGS) >= 16);
     let source = ImageOnTriangle { prepared, chart: &chart };
-    let Ok(tree) = grow(&source, range, &GrowthLimits { nodes, fine, deepest, variance: VARIANCE });
+    let Ok(tree) = grow(&source, range, &GrowthLimits { nodes, fine, deepest, variance: IMAGE_VARIANCE });
     let (root, bytes) = tree.store(pool)?;
     prepared.extra -= (bytes - memory.own).max(0.0).min(prepared.extra);
     Ok(root)
@@ -147,7 +171,7 @@ impl TreeBudget {
         let covered = chart.covered();
         let seen = w.min(size[0]) * h.min(size[1]);
         let own = if covered <= seen { covered } else { covered.min((0.25 * seen).max(TEXELS_OF_COPIES)) };
-        let own = (BYTES_PER_TEXEL * own).min(MAX_BYTES);
+        let own = (BYTES_PER_TEXEL * own).min(IMAGE_TREE_BYTES);
         let share = (covered / (size[0] * size[1])).min(1.0);
         Self { own, most: own.max((BYTES_PER_IMAGE * share).min(own + prepared.extra)) }
     }
@@ -158,7 +182,7 @@ impl TreeBudget {
             return 0;
         }
         let blocks = ((self.most / size_of::<CellBlock>() as f64) as usize).max(1);
-        let nodes = blocks * CELLS / ARITY;
+        let nodes = blocks * BLOCK_CELLS / ARITY;
         let [w, h] = texture.size().map(f64::from);
         let copies = 0.5 * chart.extent().0 / (w * h);
         let leaves = ((ARITY - 1) * nodes) as f64;

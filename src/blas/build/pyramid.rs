@@ -4,8 +4,8 @@ use alloc::vec::Vec;
 
 use crate::blas::build::texture::Texture;
 
-/// Memory for edges between the few large texels of a small image. All its triangles share it: the first ones take what
-/// they need.
+/// Bytes for edges between the few large texels of a small image. All its triangles share it: the first ones take what
+/// they need. A budget: images of fewer than 2^17 texels have sharper edges with more.
 pub(super) const BYTES_PER_IMAGE: f64 = (1 << 18) as f64;
 
 /// What is known of a block of texels.

@@ -4,7 +4,8 @@ use crate::error::{Error, Kind};
 use crate::math::floor64;
 use crate::record::{Filter, Wrap};
 
-/// The longest side of an image, in texels.
+/// The longest side of an image, in texels. *Proved*: with [`UV_LIMIT`](super::footprint::UV_LIMIT), coordinates in
+/// texels stay below 2^32, which leaves a double 20 bits within a texel.
 pub(crate) const MAX_SIDE: usize = 1 << 15;
 
 /// A scalar weight over texture coordinates: luminance of an emission, transmittance of a portal.
@@ -13,9 +14,9 @@ pub(crate) const MAX_SIDE: usize = 1 << 15;
 /// `[j / height, (j + 1) / height)`. Filter and wrap say how the host looks the image up, so that no place where the
 /// host sees light is left without a chance of being sampled.
 ///
-/// Texture coordinates outside of `[0, 1]` repeat the image if it wraps so. The trees over it do not grow with the number
-/// of copies: a triangle takes no more than 64 kB, or half a byte a texel if that is more, besides the 256 kB that all
-/// triangles of a small image share. For a weight without an image see [`Procedural`](crate::Procedural).
+/// Texture coordinates outside of `[0, 1]` repeat the image if it wraps so. The trees over it do not grow with the
+/// number of copies: a triangle takes no more than 64 kB, or half a byte a texel if that is more, besides the 256 kB
+/// that all triangles of a small image share. For a weight without an image see [`Procedural`](crate::Procedural).
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     width: u32,
