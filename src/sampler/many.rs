@@ -8,7 +8,7 @@ use super::lights::{LightSampler, LightSamplerView, Scene};
 use super::sample::variates;
 use crate::record::{LightSample, ShadingPoint};
 use crate::simd::prefetch;
-use crate::tlas::{Descent, TURNS};
+use crate::tlas::{Descent, INTERLEAVED};
 use crate::warp::Variate;
 
 impl<const M: usize> LightSampler<M> {
@@ -30,14 +30,14 @@ impl<const M: usize> LightSamplerView<'_, M> {
             let each = queries.iter().zip(samples);
             return each.for_each(|((x, u), sample)| *sample = self.sample(x, *u));
         }
-        for (queries, samples) in queries.chunks(TURNS).zip(samples.chunks_mut(TURNS)) {
+        for (queries, samples) in queries.chunks(INTERLEAVED).zip(samples.chunks_mut(INTERLEAVED)) {
             self.sample_few(queries, samples);
         }
     }
 
     fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        let mut walks = SmallVec::<[Descent<Scene<'_>>; TURNS]>::new();
-        let mut points = SmallVec::<[[Variate; 2]; TURNS]>::new();
+        let mut walks = SmallVec::<[Descent<Scene<'_>>; INTERLEAVED]>::new();
+        let mut points = SmallVec::<[[Variate; 2]; INTERLEAVED]>::new();
         for (x, u) in queries {
             let [choice, point @ ..] = variates(*u);
             walks.push(Descent::new(x, self.scene(x), choice));

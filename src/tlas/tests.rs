@@ -128,14 +128,17 @@ fn a_sample_has_the_probability_of_its_leaf() {
     let mut pcg = Pcg32::new(4, 1);
     let (tlas, _) = build(Arity::Eight, &cloud(5000, &mut pcg));
     let view = tlas.view();
+    let mut found = 0;
     for i in 0..20_000 {
         let x = shading_point(i, &mut pcg);
         let u = pcg.next_f32();
         if let Some((leaf, pmf)) = view.sample(&x, &Odd, None, Variate::new(u, seed(&[u]))) {
             let again = view.pmf(leaf, &x, &Odd, None);
             assert!((pmf / again - 1.0).abs() < 1e-12, "leaf {leaf}: {pmf} {again}");
+            found += 1;
         }
     }
+    assert!(found > 10_000, "{found} drawn");
 }
 
 #[test]
@@ -156,7 +159,7 @@ fn all_instruction_sets_give_the_same_bits() {
 fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg: &mut Pcg32) {
     let (tlas, _) = build(arity::<N>(), lights);
     let tlas = &tlas.view().wide::<N>();
-    let mut found = 0;
+    let (mut found, mut entered) = (0, [0; 2]);
     for i in 0..3000 {
         let x = &shading_point(i, pcg);
         let x = &ShadingPoint { position: x.position * scale, ..*x };
@@ -170,7 +173,9 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let first = all.next();
         found += usize::from(first.is_some_and(|(drawn, ..)| drawn.is_some()));
         assert!(all.all(|other| Some(other) == first));
-        let (node, origin, axis) = (&tlas.nodes[i % tlas.nodes.len()], x.position, pcg.direction());
+        // Towards a light, at nodes near the root, so that something is met.
+        let (node, origin) = (&tlas.nodes[i % tlas.nodes.len().min(8)], x.position);
+        let axis = (lights[i % lights.len()].1.mean - origin).normalize();
         let inverse = axis.recip();
         let lanes = |level: InstructionSet| {
             let crossed = level.run(Crossed { node, origin, inverse });
@@ -179,7 +184,12 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let mut all = InstructionSet::all().map(lanes);
         let first = all.next();
         assert!(all.all(|other| Some(other) == first));
+        first.into_iter().for_each(|(crossed, met)| {
+            entered[0] += usize::from(crossed != 0);
+            entered[1] += usize::from(met != 0);
+        });
     }
+    assert!(entered.iter().all(|&count| count > 50), "{entered:?} entered");
     assert!(found > 2000, "{found} drawn");
 }
 
@@ -222,7 +232,8 @@ fn a_ray_finds_every_box_that_it_crosses() {
     let mut pcg = Pcg32::new(7, 1);
     let lights = cloud(2000, &mut pcg);
     let (tlas, order) = build(Arity::Eight, &lights);
-    for i in 0..300 {
+    let mut crossed = 0;
+    for i in 0..3000 {
         let origin = shading_point(i, &mut pcg).position;
         let direction = if i % 5 == 0 { [Vec3::X, Vec3::NEG_Y, Vec3::Z][i % 3] } else { pcg.direction() };
         let mut found = Vec::new();
@@ -230,10 +241,12 @@ fn a_ray_finds_every_box_that_it_crosses() {
         for (leaf, &light) in (0..).zip(&order) {
             if passes_through(origin, direction, &lights[light as usize].0.aabb) {
                 assert!(found.contains(&leaf), "leaf {leaf} from {origin} along {direction}");
+                crossed += 1;
             }
         }
         assert!(found.len() < 400, "{} boxes found", found.len());
     }
+    assert!(crossed > 300, "{crossed} boxes crossed");
 }
 
 /// Slab test in double precision, shrunk a little so that it decides only clear cases.
@@ -286,16 +299,19 @@ fn split_visits_have_their_expected_counts() {
 fn without_splitting_there_is_one_visit_like_a_plain_sample() {
     let mut pcg = Pcg32::new(9, 1);
     let (tlas, _) = build(Arity::Eight, &cloud(300, &mut pcg));
+    let mut found = 0;
     for i in 0..500 {
         let x = shading_point(i, &mut pcg);
         for splitting in [Splitting { threshold: 0.0, levels: 9 }, Splitting { threshold: 1.0, levels: 0 }] {
             let visits = visits(&tlas, &x, pcg.next_f32(), &splitting);
             assert!(visits.len() <= 1);
+            found += visits.len();
             for (leaf, count) in visits {
                 assert!((count / tlas.view().pmf(leaf, &x, &Odd, None) - 1.0).abs() < 1e-12);
             }
         }
     }
+    assert!(found > 500, "{found} visits");
 }
 
 #[test]

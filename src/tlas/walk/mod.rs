@@ -7,12 +7,13 @@ mod beam;
 pub(in crate::tlas) mod descend;
 mod importance;
 pub(in crate::tlas) mod ray;
+mod receiver;
 mod split;
 
 use glam::Vec3;
 
 pub(crate) use beam::{Beam, Outgoing};
-pub(crate) use descend::{Descent, FirstWeights, TURNS};
+pub(crate) use descend::{Descent, FirstWeights, INTERLEAVED};
 pub(crate) use importance::LeafOracle;
 pub use split::Splitting;
 

@@ -14,8 +14,8 @@ pub struct Splitting {
     /// From 0 (never) to 1 (always): a node is split where `(1 + σ)^-1/4` lies below, with σ the standard deviation
     /// of its contribution relative to the whole tree's.
     pub threshold: f32,
-    /// Levels of the tree, counted from the root, that may be split. A tree of arity `N` gives at most
-    /// `N^levels` samples.
+    /// Levels of the tree, counted from the root, that may be split. A tree of [arity](crate::Arity) `N` gives
+    /// at most `N^levels` samples.
     pub levels: u32,
 }
 
@@ -25,7 +25,7 @@ impl Default for Splitting {
     }
 }
 
-/// The measure's frame: distances count in units of the distance to the tree as a whole.
+/// Frame of the measure: distances are in units of the distance to the tree as a whole.
 struct Measure {
     threshold: f32,
     inverse_scale2: f32,
@@ -84,7 +84,7 @@ impl<const N: usize> WideTree<'_, N> {
         }
     }
 
-    /// Expected number of times that [`Self::sample_split`] visits a leaf.
+    /// Returns the expected number of times that [`Self::sample_split`] visits a leaf.
     pub(crate) fn expected_count(
         &self,
         leaf: u32,
@@ -137,7 +137,7 @@ impl<const N: usize> WideTree<'_, N> {
         quality < measure.threshold
     }
 
-    /// Least and largest distance from a point to the boxes of a node's children.
+    /// Returns the least and largest distance from a point to the boxes of a node's children.
     fn distances(&self, node: usize, x: &ShadingPoint) -> (f32, f32) {
         let node = &self.nodes[node];
         let (low, high) = node.corners();
