@@ -12,6 +12,7 @@ mod feature_sampling;
 mod feature_texel;
 mod features;
 mod image;
+mod lanes;
 mod lat_long;
 mod pyramid;
 mod resample;

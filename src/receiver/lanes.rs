@@ -4,6 +4,7 @@
 use glam::Vec3;
 
 use crate::geometry::HORIZON_ROUNDING;
+use crate::math::at_least;
 
 /// Least expected cosine at a surface of a cluster that is not culled.
 ///
@@ -40,5 +41,16 @@ impl ReceiverLanes {
     ) -> Self {
         let slack = HORIZON_ROUNDING * horizon.abs().element_sum();
         Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack }
+    }
+
+    /// Returns the mean weights of small cells of directions by the cosines of their central directions to the normal.
+    /// `least` are those of [`ReceiverKind::least_over_directions`](super::ReceiverKind::least_over_directions).
+    #[inline(always)]
+    pub(crate) fn weights_of_cells<const LANES: usize>(
+        &self,
+        cosines: &[f32; LANES],
+        least: &[f32; LANES],
+    ) -> [f32; LANES] {
+        core::array::from_fn(|i| at_least(f32::from_bits(cosines[i].to_bits() & self.cosine_bits), least[i]))
     }
 }
