@@ -43,7 +43,7 @@ type FootprintPolygon = geometry::Polygon<f64, 12>;
 /// It is zero exactly where the whole touched range is black. Otherwise it is a normal number between the range's
 /// ends, and exact (up to rounding, and up to a floor of a millionth of the brightest texel) for footprints of up to
 /// about 48 texels.
-pub(crate) fn average(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint, range: TexelRange) -> f32 {
+pub(crate) fn average(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, range: TexelRange) -> f32 {
     if range.is_constant() {
         return storable(f64::from(range.max));
     }
@@ -53,13 +53,13 @@ pub(crate) fn average(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint,
     });
     let line = footprint.double_area() <= LINE_AREA * longest;
     let mean = if line {
-        looked_up(prepared, footprint)
+        looked_up(pyramid, footprint)
     } else if texels(footprint) > EXACT_TEXELS {
-        blocks(prepared, footprint)
+        blocks(pyramid, footprint)
     } else {
-        match prepared.texture().filtering() {
-            Filter::Nearest => nearest(prepared, footprint),
-            Filter::Bilinear => bilinear(prepared, footprint),
+        match pyramid.texture().filtering() {
+            Filter::Nearest => nearest(pyramid, footprint),
+            Filter::Bilinear => bilinear(pyramid, footprint),
         }
     };
     let (min, max) = (f64::from(range.min), f64::from(range.max));
@@ -137,8 +137,8 @@ fn bilinear_weights(polygon: &FootprintPolygon, corner: [f64; 2]) -> [f64; 4] {
 }
 
 /// Texels weighted by the area that the footprint covers of each.
-fn nearest(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
-    let texture = prepared.texture();
+fn nearest(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
+    let texture = pyramid.texture();
     let (mut sum, mut total) = (0.0, 0.0);
     squares(FootprintPolygon::new(footprint.corners), |corner, piece| {
         let covered = area(piece);
@@ -150,8 +150,8 @@ fn nearest(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
 }
 
 /// The integral of the interpolated texture, one patch between four texel centers at a time.
-fn bilinear(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
-    let texture = prepared.texture();
+fn bilinear(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
+    let texture = pyramid.texture();
     let (mut sum, mut total) = (0.0, 0.0);
     // Patches have their corners at texel centers.
     let shifted = footprint.corners.map(|[x, y]| [x - 0.5, y - 0.5]);
@@ -169,24 +169,24 @@ fn bilinear(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
 
 /// The mean of lookups at the centers of cells, in a level of the pyramid whose blocks are about as large as these
 /// cells. Ignores the half texel that bilinear lookup blurs a block's edge by.
-fn blocks(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
-    let texture = prepared.texture();
+fn blocks(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
+    let texture = pyramid.texture();
     let (size, wrap) = (texture.size(), texture.wrapping());
     let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
     let mut level = 0;
-    while level < prepared.top() && span > f64::from(IMAGE_SUBDIVISION << level) {
+    while level < pyramid.top() && span > f64::from(IMAGE_SUBDIVISION << level) {
         level += 1;
     }
     mean_of_centers(footprint, |[x, y]| {
         let texel = |at: f64, k: usize| wrap_index(wrap[k], footprint.origin[k] + floor64(at) as i64, size[k]);
-        f64::from(prepared.block(level, texel(x, 0) >> level, texel(y, 1) >> level).mean)
+        f64::from(pyramid.block(level, texel(x, 0) >> level, texel(y, 1) >> level).mean)
     })
 }
 
 /// The mean of lookups, for footprints without area: a point or a line.
-fn looked_up(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
+fn looked_up(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
     let [x0, y0] = footprint.origin.map(|origin| origin as f64);
-    mean_of_centers(footprint, |[x, y]| prepared.texture().value_at(x0 + x, y0 + y))
+    mean_of_centers(footprint, |[x, y]| pyramid.texture().value_at(x0 + x, y0 + y))
 }
 
 /// Mean over the centers of the cells of a regular subdivision.
