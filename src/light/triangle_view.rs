@@ -144,7 +144,7 @@ impl<'a> TriangleView<'a> {
     /// Whether points are drawn by direction rather than by area, where the solid angle allows it: without a texture, unless
     /// points uniform by area are as good.
     #[inline]
-    fn prefers_directions(&self) -> bool {
+    pub(super) fn prefers_directions(&self) -> bool {
         let is_plain = self.root.node == LEAF && self.illumination == Illumination::ClampedVertices;
         let is_final = || self.environment.is_none() || self.weigh(LatticeCell::whole(), &mut self.whole()).is_final;
         is_plain && !(self.has_constant_geometry() && is_final())

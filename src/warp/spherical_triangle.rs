@@ -173,7 +173,7 @@ fn positive(x: f64) -> f64 {
     if x > 0.0 { x } else { 0.0 }
 }
 
-/// Returns sine and cosine of an angle in `[0, π]`, within 1e-13; the sine of a small angle to the same relative error.
+/// Returns sine and cosine of an angle in `[0, π]`, within 1e-12; the sine of a small angle to the same relative error.
 #[inline(always)]
 fn sin_cos(angle: f64) -> (f64, f64) {
     // The series of a quarter of the angle, doubled twice.

@@ -32,7 +32,7 @@ fn functions_are_those_of_the_library() {
     for i in 0..100_000 {
         let x = f64::from(pcg.next_f32()) * PI * [1.0, 1e-6][i % 2];
         let (sin, cos) = sin_cos(x);
-        assert!((sin - x.sin()).abs() <= 1e-13 + 1e-13 * x.sin() && (cos - x.cos()).abs() < 1e-13, "{x}");
+        assert!((sin - x.sin()).abs() <= 1e-12 * x.min(1.0) && (cos - x.cos()).abs() < 1e-12, "{x}");
         let (y, x) = (f64::from(pcg.next_f32()) * [1.0, 1e-9, 1e9][i % 3], f64::from(pcg.next_f32()) - 0.5);
         let (found, exact) = (angle(y, x), y.atan2(x));
         assert!((found - exact).abs() <= 1e-11 * exact, "{y} {x}: {found} {exact}");
@@ -69,6 +69,9 @@ fn any_point_and_any_direction_are_safe() {
                     let direction = triangle.direction([u, v]);
                     assert!(direction.is_finite() && (direction.length() - 1.0).abs() < 1e-6, "{triangle:?} {u} {v}");
                 }
+            }
+            if triangle.solid_angle() < 1e-6 {
+                continue;
             }
             for corner in [triangle.a, triangle.b, triangle.c] {
                 let [u, v] = triangle.invert(corner);
