@@ -8,7 +8,7 @@
 use super::cone::{CONSTANT_RATIO, DEFENSIVE_SHARE};
 use super::view::EnvironmentView;
 use crate::math::{self, at_least, at_most};
-use crate::warp::equal_area::{LANES_ERROR, SPHERE, STRETCH};
+use crate::warp::equal_area::{QUICK_ERROR, SPHERE, STRETCH};
 
 /// Share of the covering lookup in an estimate. *Measured* on skies with black patches and with lamps: 2 % to 25 % differ
 /// only where the contrast is large, and there the larger share has up to a third of the variance.
@@ -49,48 +49,44 @@ impl EnvironmentView<'_> {
         !(least > 0.0 && largest <= SMOOTH_CONTRAST * self.mean_without_features())
     }
 
-    /// Returns vectors, given by coordinate, in the environment's frame.
+    /// Returns a vector in the environment's frame.
     #[inline(always)]
-    pub(crate) fn to_local_lanes<const LANES: usize>(&self, [x, y, z]: &[[f32; LANES]; 3]) -> [[f32; LANES]; 3] {
-        self.header.rotation.map(|axis| core::array::from_fn(|i| axis[0] * x[i] + axis[1] * y[i] + axis[2] * z[i]))
+    pub(crate) fn to_local(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        self.header.rotation.map(|axis| axis[0] * x + axis[1] * y + axis[2] * z)
     }
 
     /// Returns the number of texels a side of the level whose filter is nearest to a solid angle.
     #[inline(always)]
-    pub(crate) fn filter_size(&self, solid_angle: f32) -> f32 {
-        (1_u32 << self.depth_of_solid_angle(solid_angle)) as f32
+    pub(crate) fn filter_size(&self, solid_angle: f32) -> u32 {
+        1 << self.depth_of_solid_angle(solid_angle)
     }
 
-    /// Returns the numbers of texels a side of the levels whose filters hold regions. `angles` are bounds of the angle from
-    /// the central direction of each region to any other.
+    /// Returns the number, among those of all levels, of the first texel of the level of this size.
     #[inline(always)]
-    pub(crate) fn cover_sizes<const LANES: usize>(&self, angles: &[f32; LANES]) -> [f32; LANES] {
-        let finest = (1_u32 << self.header.depth) as f32;
-        core::array::from_fn(|i| {
-            // Wherever in its texel the center lies, the neighborhood reaches a texel further, which is at least as wide
-            // as this: the power of two above it.
-            let half = 1.001 * STRETCH * angles[i] + LANES_ERROR;
-            let size = f32::from_bits((253_u32 << 23).wrapping_sub(half.to_bits() & 0x7f80_0000));
-            // NaN and what is too large for any texel get the whole sphere.
-            let size = if half < 0.5 { size } else { 1.0 };
-            at_least(at_most(size, finest), 1.0)
-        })
+    pub(crate) fn first_texel(size: u32) -> u32 {
+        // Levels start at (size² - 1) / 3: every other bit below that of size².
+        size.wrapping_mul(size).wrapping_sub(1) & 0x5555_5555
     }
 
-    /// Returns the numbers, among those of all levels, of the texels at points of the square in levels of these sizes.
+    /// Returns the number of texels a side of the level whose filter holds a region. `angle` is a bound of the angle from the
+    /// central direction to any other. `finest` is [`size`](Self::size).
     #[inline(always)]
-    pub(crate) fn texels_of_lanes<const LANES: usize>(
-        [x, y]: &[[f32; LANES]; 2],
-        sizes: &[f32; LANES],
-    ) -> [u32; LANES] {
-        core::array::from_fn(|i| {
-            let size = sizes[i];
-            let (x, y) = (floor(x[i] * size), floor(y[i] * size));
-            // Levels start at (size² - 1) / 3: every other bit below that of size².
-            let size = (size + INTEGER).to_bits() & INTEGER_MASK;
-            let start = size.wrapping_mul(size).wrapping_sub(1) & 0x5555_5555;
-            start.wrapping_add(y.wrapping_mul(size)).wrapping_add(x)
-        })
+    pub(crate) fn cover_size(angle: f32, finest: f32) -> f32 {
+        // Wherever in its texel the center lies, the neighborhood reaches a texel further, which is at least as wide as this:
+        // the power of two above it.
+        let half = 1.001 * STRETCH * angle + QUICK_ERROR;
+        let size = f32::from_bits((253_u32 << 23).wrapping_sub(half.to_bits() & 0x7f80_0000));
+        // NaN and what is too large for any texel get the whole sphere.
+        let size = if half < 0.5 { size } else { 1.0 };
+        at_least(at_most(size, finest), 1.0)
+    }
+
+    /// Returns the number, among those of all levels, of the texel at a point of the square in the level of this size.
+    #[inline(always)]
+    pub(crate) fn texel_in_level([x, y]: [f32; 2], size: f32) -> u32 {
+        let (x, y) = (texel_of(x * size), texel_of(y * size));
+        let size = (size + INTEGER).to_bits() & INTEGER_MASK;
+        Self::first_texel(size).wrapping_add(y.wrapping_mul(size)).wrapping_add(x)
     }
 
     /// Multiplies weights with the radiances of regions over the mean radiance. `fine` are the texels of the size of the
@@ -139,16 +135,19 @@ impl EnvironmentView<'_> {
     fn gather<const LANES: usize>(&self, texels: &[u32; LANES]) -> [f32; LANES] {
         let filtered = self.filtered;
         let mut values = [0.0; LANES];
+        let Some(last) = filtered.len().checked_sub(1) else { return values };
         for i in 0..LANES {
-            // Always in range: the alternative costs no more than the check.
-            values[i] = filtered.get(texels[i] as usize).copied().unwrap_or(0.0);
+            // Always in range. A choice, as it costs less than a check.
+            let texel = texels[i] as usize;
+            values[i] = filtered[if texel < last { texel } else { last }];
         }
         values
     }
 }
 
-/// The largest integer not above a number in `[0, 2^14)`, or a neighbor where rounding is undecided.
+/// Returns the largest integer not above a number in `[0, 2^14)`, or a neighbor where rounding is undecided: the column or row
+/// of a coordinate in units of texels.
 #[inline(always)]
-fn floor(x: f32) -> u32 {
+pub(crate) fn texel_of(x: f32) -> u32 {
     (x - 0.5 + INTEGER).to_bits() & INTEGER_MASK
 }

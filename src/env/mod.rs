@@ -29,6 +29,7 @@ pub use descend::EnvironmentSample;
 pub(crate) use feature_texel::FeatureTexel;
 pub(crate) use features::BrightFeature;
 pub use image::{EnvironmentImage, Poles};
+pub(crate) use lanes::texel_of;
 pub use view::{Environment, EnvironmentView};
 pub(crate) use weighted::DirectionDistribution;
 

@@ -14,14 +14,14 @@ use glam::{DVec3, Vec3};
 
 use super::triangle_view::TriangleView;
 use super::visible_part::VisiblePart;
-use crate::env::EnvironmentView;
+use crate::env::{EnvironmentView, texel_of};
 use crate::math::{self, at_least};
 use crate::receiver::{Receiver, ReceiverKind, ReceiverLanes};
-use crate::warp::equal_area::sphere_to_square_lanes;
-use crate::warp::{SphericalColumns, Variate, keep_possible, pick_pair, pick_wide, pmf_wide};
+use crate::warp::equal_area::sphere_to_square_quickly;
+use crate::warp::{COLUMNS, SphericalColumns, Variate, keep_positive, pick_pair, pick_wide, pmf_wide};
 
 /// Columns of a step, and rows.
-const SIDE: usize = 8;
+const SIDE: usize = COLUMNS;
 /// Base-2 logarithm of [`SIDE`].
 const SIDE_BITS: u32 = SIDE.trailing_zeros();
 /// Columns of each of two spherical triangles that share a step.
@@ -135,8 +135,18 @@ trait GridGuide {
         cell: &GridCell,
         column_bits: u32,
         sums: &[f32; SIDE],
-        rows: impl Fn(usize) -> [f32; SIDE],
+        weights: &[f32; LANES],
     ) -> Option<([usize; 2], f64)>;
+}
+
+/// Weights of the cells of a column.
+#[inline(always)]
+fn rows_of(weights: &[f32; LANES], column: usize) -> [f32; SIDE] {
+    let mut rows = [0.0; SIDE];
+    for (j, row) in rows.iter_mut().enumerate() {
+        *row = weights[j * SIDE + column % SIDE];
+    }
+    rows
 }
 
 /// Draws the way.
@@ -151,10 +161,10 @@ impl GridGuide for DrawCell {
         _cell: &GridCell,
         _column_bits: u32,
         sums: &[f32; SIDE],
-        rows: impl Fn(usize) -> [f32; SIDE],
+        weights: &[f32; LANES],
     ) -> Option<([usize; 2], f64)> {
         let (column, share) = pick_wide(sums, &mut self.u[1])?;
-        let (row, share_of_column) = pick_wide(&rows(column), &mut self.u[0])?;
+        let (row, share_of_column) = pick_wide(&rows_of(weights, column), &mut self.u[0])?;
         Some(([column, row], share * share_of_column))
     }
 }
@@ -171,36 +181,62 @@ impl GridGuide for FollowPoint {
         cell: &GridCell,
         column_bits: u32,
         sums: &[f32; SIDE],
-        rows: impl Fn(usize) -> [f32; SIDE],
+        weights: &[f32; LANES],
     ) -> Option<([usize; 2], f64)> {
         let GridPoint { part, fixed: [column, row] } = self.point;
         let column = (column >> (FIXED_BITS - cell.column_bits - column_bits)) as usize & ((1 << column_bits) - 1);
         let row = (row >> (FIXED_BITS - cell.row_bits - SIDE_BITS)) as usize & (SIDE - 1);
         // In a step that two share, the second has the last columns.
         let column = if column_bits < SIDE_BITS { column + part * HALF } else { column };
-        let pmf = pmf_wide(sums, column) * pmf_wide(&rows(column), row);
+        let pmf = pmf_wide(sums, column) * pmf_wide(&rows_of(weights, column), row);
         (pmf > 0.0).then_some(([column, row], pmf))
     }
 }
 
-/// What all rows of a step share, by column.
-struct Columns {
+/// One step of a descent.
+struct Step {
     /// Start of the arcs, the same for all columns of a spherical triangle, by coordinate.
     poles: [[f32; SIDE]; 3],
-    arcs: SphericalColumns<SIDE>,
-    /// Solid angle of each cell.
+    arcs: SphericalColumns,
+    /// Solid angle of each cell, by column.
     solid_angles: [f32; SIDE],
-    /// Least mean weight of the receiver over each cell.
+    /// Least mean weight of the receiver over each cell, by column.
     least: [f32; SIDE],
-    /// Texels a side of the level that the environment is looked up in.
-    sizes: [f32; SIDE],
+    /// Level that the environment is looked up in, by column.
+    levels: Levels,
+    /// Weights of the cells.
+    weights: [f32; LANES],
+    /// Points of the square of the environment that the cells' centers lie at.
+    points: [[f32; LANES]; 2],
+    /// Texels of the levels.
+    texels: [u32; LANES],
 }
 
-/// The weights of a step, and where the environment was looked up.
-struct Weighed {
-    weights: [f32; LANES],
-    /// Points of the square of the environment.
-    points: [[f32; LANES]; 2],
+/// Levels of the environment, by column.
+#[derive(Default)]
+struct Levels {
+    /// Texels a side.
+    sizes: [f32; SIDE],
+    /// Number of the first texel.
+    starts: [u32; SIDE],
+    /// Texels a row.
+    strides: [u32; SIDE],
+}
+
+impl Step {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            poles: [[0.0; SIDE]; 3],
+            arcs: SphericalColumns::default(),
+            solid_angles: [0.0; SIDE],
+            least: [0.0; SIDE],
+            levels: Levels::default(),
+            weights: [0.0; LANES],
+            points: [[0.0; LANES]; 2],
+            texels: [0; LANES],
+        }
+    }
 }
 
 impl<'a> SphericalGrid<'a> {
@@ -259,41 +295,44 @@ impl<'a> SphericalGrid<'a> {
     fn descend(&self, guide: &mut impl GridGuide) -> Option<(GridCell, f64)> {
         let mut cell = GridCell::ALL;
         let mut pmf = 1.0;
-        for step in 1..=MAX_STEPS {
-            let is_shared = step == 1 && self.visible.is_split();
-            let columns = if is_shared {
-                let mut columns = self.columns::<HALF>(&cell);
-                columns.append(&self.columns::<HALF>(&GridCell { part: 1, ..cell }));
-                columns
+        let mut step = Step::new();
+        for number in 1..=MAX_STEPS {
+            let is_shared = number == 1 && self.visible.is_split();
+            if is_shared {
+                self.columns::<0, HALF>(&cell, &mut step);
+                self.columns::<HALF, HALF>(&GridCell { part: 1, ..cell }, &mut step);
             } else {
-                self.columns::<SIDE>(&cell)
-            };
-            let column_bits = if is_shared { SIDE_BITS - 1 } else { SIDE_BITS };
-            let Weighed { weights, points } = self.weigh(&cell, &columns, is_shared);
+                self.columns::<0, SIDE>(&cell, &mut step);
+            }
+            match self.environment {
+                None => self.weigh_directions::<false>(&cell, None, &mut step),
+                Some(environment) => {
+                    self.weigh_directions::<true>(&cell, Some(environment), &mut step);
+                    let rough = environment.is_rough().then(|| self.cover(environment, &cell, is_shared, &step));
+                    environment.weigh_lanes(&step.texels, rough.as_ref(), &mut step.weights);
+                }
+            }
+            keep_positive(&mut step.weights);
             let mut sums = [0.0; SIDE];
             for j in 0..SIDE {
                 for i in 0..SIDE {
-                    sums[i] += weights[j * SIDE + i];
+                    sums[i] += step.weights[j * SIDE + i];
                 }
             }
-            let rows = |column: usize| core::array::from_fn(|j| weights[(j * SIDE + column) % LANES]);
-            let ([column, row], chosen) = guide.choose(&cell, column_bits, &sums, rows)?;
+            let column_bits = if is_shared { SIDE_BITS - 1 } else { SIDE_BITS };
+            let ([column, row], chosen) = guide.choose(&cell, column_bits, &sums, &step.weights)?;
             pmf *= chosen;
-            if is_shared {
-                cell.part = column / HALF;
-            }
-            let within = column as u32 & ((1 << column_bits) - 1);
+            let lane = (row * SIDE + column) % LANES;
             cell = GridCell {
-                part: cell.part,
-                column: cell.column << column_bits | within,
+                part: if is_shared { column / HALF } else { cell.part },
+                column: cell.column << column_bits | (column as u32 & ((1 << column_bits) - 1)),
                 column_bits: cell.column_bits + column_bits,
                 row: cell.row << SIDE_BITS | row as u32,
                 row_bits: cell.row_bits + SIDE_BITS,
             };
             let Some(environment) = self.environment else { break };
-            let lane = (row * SIDE + column) % LANES;
-            let point = [points[0][lane], points[1][lane]];
-            if step == MAX_STEPS || environment.is_about_constant(point, columns.solid_angles[column % SIDE]) {
+            let point = [step.points[0][lane], step.points[1][lane]];
+            if number == MAX_STEPS || environment.is_about_constant(point, step.solid_angles[column % SIDE]) {
                 break;
             }
         }
@@ -302,83 +341,77 @@ impl<'a> SphericalGrid<'a> {
         Some((cell, pmf / solid_angle))
     }
 
-    /// Returns the columns of a step in the first lanes.
+    /// Finds the columns from `START` on of the cells of a cell.
     #[inline(always)]
-    fn columns<const COLUMNS: usize>(&self, cell: &GridCell) -> Columns {
+    fn columns<const START: usize, const COUNT: usize>(&self, cell: &GridCell, step: &mut Step) {
         let triangle = &self.visible.triangles()[cell.part];
         let ([u, _], [width, height]) = (cell.corner(), cell.size());
-        let step = width * (1.0 / COLUMNS as f64);
-        let arcs = triangle.columns::<COLUMNS>(u + 0.5 * step, step);
-        let solid_angle = (triangle.solid_angle() * (width * height) * (1.0 / (COLUMNS * SIDE) as f64)) as f32;
-        let size = self.environment.map_or(1.0, |environment| environment.filter_size(solid_angle));
-        Columns {
-            poles: triangle.pole().as_vec3().to_array().map(|x| [x; SIDE]),
-            arcs: widened(&arcs),
-            solid_angles: [solid_angle; SIDE],
-            least: [self.receiver.least_over_directions(solid_angle); SIDE],
-            sizes: [size; SIDE],
+        let stride = width * (1.0 / COUNT as f64);
+        triangle.columns::<START, COUNT>(u + 0.5 * stride, stride, &mut step.arcs);
+        let solid_angle = (triangle.solid_angle() * (width * height) * (1.0 / (COUNT * SIDE) as f64)) as f32;
+        let size = self.environment.map_or(1, |environment| environment.filter_size(solid_angle));
+        let least = self.receiver.least_over_directions(solid_angle);
+        let pole = triangle.pole().as_vec3();
+        for i in START..START + COUNT {
+            (step.poles[0][i], step.poles[1][i], step.poles[2][i]) = (pole.x, pole.y, pole.z);
+            (step.solid_angles[i], step.least[i]) = (solid_angle, least);
+            step.levels.sizes[i] = size as f32;
+            (step.levels.starts[i], step.levels.strides[i]) = (EnvironmentView::first_texel(size), size);
         }
     }
 
-    /// Weighs the cells of a step.
+    /// Weighs the cells of a step by solid angle and receiver, and finds where the environment shows in each.
     #[inline(always)]
-    fn weigh(&self, cell: &GridCell, columns: &Columns, is_shared: bool) -> Weighed {
-        let heights = self.rows(cell, 0.5);
-        let Columns { poles, arcs, .. } = columns;
+    fn weigh_directions<const HAS_ENVIRONMENT: bool>(
+        &self,
+        cell: &GridCell,
+        environment: Option<&EnvironmentView<'_>>,
+        step: &mut Step,
+    ) {
+        let ([_, v], [_, height]) = (cell.corner(), cell.size());
+        let (v, stride) = (v as f32, height as f32 * (1.0 / SIDE as f32));
+        let Step {
+            poles,
+            arcs: SphericalColumns { toward, versines, .. },
+            solid_angles,
+            least,
+            weights,
+            points,
+            levels,
+            texels,
+        } = step;
         let normal = self.lanes.normal;
-        let cosines = |of: &[[f32; SIDE]; 3]| -> [f32; SIDE] {
-            core::array::from_fn(|i| normal.x * of[0][i] + normal.y * of[1][i] + normal.z * of[2][i])
-        };
-        let (pole_cosines, arc_cosines) = (cosines(poles), cosines(&arcs.toward));
-        let mut weighed = Weighed { weights: [0.0; LANES], points: [[0.0; LANES]; 2] };
-        let mut texels = [0; LANES];
-        let local = self.environment.map(|environment| {
-            (environment.to_local_lanes(poles), environment.to_local_lanes(&arcs.toward))
-        });
+        let (mut pole_cosines, mut cosines) = ([0.0; SIDE], [0.0; SIDE]);
+        let (mut local_poles, mut local) = ([[0.0; SIDE]; 3], [[0.0; SIDE]; 3]);
+        for i in 0..SIDE {
+            pole_cosines[i] = normal.x * poles[0][i] + normal.y * poles[1][i] + normal.z * poles[2][i];
+            cosines[i] = normal.x * toward[0][i] + normal.y * toward[1][i] + normal.z * toward[2][i];
+            if let Some(environment) = environment.filter(|_| HAS_ENVIRONMENT) {
+                [local_poles[0][i], local_poles[1][i], local_poles[2][i]] =
+                    environment.to_local([poles[0][i], poles[1][i], poles[2][i]]);
+                [local[0][i], local[1][i], local[2][i]] =
+                    environment.to_local([toward[0][i], toward[1][i], toward[2][i]]);
+            }
+        }
         for j in 0..SIDE {
-            let (mut sines, mut versines) = ([0.0; SIDE], [0.0; SIDE]);
+            let v = v + (j as f32 + 0.5) * stride;
             for i in 0..SIDE {
-                let m = heights[j] * arcs.versines[i];
-                versines[i] = 1.0 - m;
-                sines[i] = math::sqrt(at_least(m * (2.0 - m), 0.0));
-            }
-            let cosines = core::array::from_fn(|i| pole_cosines[i] * versines[i] + arc_cosines[i] * sines[i]);
-            let toward = self.lanes.weights_of_cells(&cosines, &columns.least);
-            for i in 0..SIDE {
-                weighed.weights[j * SIDE + i] = toward[i] * columns.solid_angles[i];
-            }
-            if let Some((poles, arcs)) = &local {
-                let directions: [[f32; SIDE]; 3] = core::array::from_fn(|k| {
-                    core::array::from_fn(|i| poles[k][i] * versines[i] + arcs[k][i] * sines[i])
-                });
-                let points = sphere_to_square_lanes(&directions);
-                let found = EnvironmentView::texels_of_lanes(&points, &columns.sizes);
-                for i in 0..SIDE {
-                    weighed.points[0][j * SIDE + i] = points[0][i];
-                    weighed.points[1][j * SIDE + i] = points[1][i];
-                    texels[j * SIDE + i] = found[i];
+                let m = v * versines[i];
+                let (sin, cos) = (math::sqrt(at_least(m * (2.0 - m), 0.0)), 1.0 - m);
+                let toward = self.lanes.weight_of_cell(pole_cosines[i] * cos + cosines[i] * sin, least[i]);
+                weights[j * SIDE + i] = toward * solid_angles[i];
+                if HAS_ENVIRONMENT {
+                    let x = local_poles[0][i] * cos + local[0][i] * sin;
+                    let y = local_poles[1][i] * cos + local[1][i] * sin;
+                    let z = local_poles[2][i] * cos + local[2][i] * sin;
+                    let [x, y] = sphere_to_square_quickly([x, y, z]);
+                    (points[0][j * SIDE + i], points[1][j * SIDE + i]) = (x, y);
+                    let (column, row) = (texel_of(x * levels.sizes[i]), texel_of(y * levels.sizes[i]));
+                    texels[j * SIDE + i] =
+                        levels.starts[i].wrapping_add(row.wrapping_mul(levels.strides[i])).wrapping_add(column);
                 }
             }
         }
-        if let Some(environment) = self.environment {
-            if environment.is_rough() {
-                let cover = self.cover(environment, cell, columns, is_shared, &weighed.points);
-                environment.weigh_lanes(&texels, Some(&cover), &mut weighed.weights);
-            } else {
-                environment.weigh_lanes(&texels, None, &mut weighed.weights);
-            }
-        }
-        let possible: [bool; LANES] = core::array::from_fn(|i| weighed.weights[i] > 0.0);
-        keep_possible(&mut weighed.weights, |i| possible[i]);
-        weighed
-    }
-
-    /// Coordinates of a step's rows, at this share of each row's height.
-    #[inline(always)]
-    fn rows(&self, cell: &GridCell, share: f32) -> [f32; SIDE] {
-        let ([_, v], [_, height]) = (cell.corner(), cell.size());
-        let (v, step) = (v as f32, height as f32 * (1.0 / SIDE as f32));
-        core::array::from_fn(|j| v + (j as f32 + share) * step)
     }
 
     /// Returns the texels whose filters hold all directions of each cell.
@@ -387,101 +420,60 @@ impl<'a> SphericalGrid<'a> {
     /// square root of `v`; then across. There the end of the arc moves by at most δ, so that the chord changes by no more
     /// than that, and the arc turns around the pole by at most γ.
     #[inline(always)]
-    fn cover(
-        &self,
-        environment: &EnvironmentView<'_>,
-        cell: &GridCell,
-        columns: &Columns,
-        is_shared: bool,
-        points: &[[f32; LANES]; 2],
-    ) -> [u32; LANES] {
-        let [left, right] = [0.0, 1.0].map(|side| self.edges(cell, side, is_shared));
-        let distance = |a: &[[f32; SIDE]; 3], b: &[[f32; SIDE]; 3], i: usize| {
-            let [x, y, z] = [a[0][i] - b[0][i], a[1][i] - b[1][i], a[2][i] - b[2][i]];
-            math::sqrt(x * x + y * y + z * z)
-        };
-        let farthest = |of: fn(&SphericalColumns<SIDE>) -> &[[f32; SIDE]; 3]| -> [f32; SIDE] {
-            core::array::from_fn(|i| {
-                let (left, right) =
-                    (distance(of(&left), of(&columns.arcs), i), distance(of(&right), of(&columns.arcs), i));
-                at_least(left, right)
-            })
-        };
-        let (ends, turns) = (farthest(|arcs| &arcs.ends), farthest(|arcs| &arcs.toward));
-        let chords: [f32; SIDE] = core::array::from_fn(|i| math::sqrt(2.0 * columns.arcs.versines[i]));
-        let [low, center, high] = [0.0, 0.5, 1.0].map(|share| self.rows(cell, share).map(math::sqrt));
+    fn cover(&self, environment: &EnvironmentView<'_>, cell: &GridCell, is_shared: bool, step: &Step) -> [u32; LANES] {
+        let (mut ends, mut turns, mut chords) = ([0.0; SIDE], [0.0; SIDE], [0.0; SIDE]);
+        for side in [0.0, 1.0] {
+            let mut edges = SphericalColumns::default();
+            self.edges(cell, side, is_shared, &mut edges);
+            for i in 0..SIDE {
+                ends[i] = at_least(ends[i], distance(&edges.ends, &step.arcs.ends, i));
+                turns[i] = at_least(turns[i], distance(&edges.toward, &step.arcs.toward, i));
+            }
+        }
+        for i in 0..SIDE {
+            chords[i] = math::sqrt(2.0 * step.arcs.versines[i]);
+        }
+        let finest = environment.size() as f32;
+        let ([_, v], [_, height]) = (cell.corner(), cell.size());
+        let (v, stride) = (v as f32, height as f32 * (1.0 / SIDE as f32));
         let mut texels = [0; LANES];
         for j in 0..SIDE {
-            let (along, top) = (center[j] - low[j], high[j]);
-            let angles: [f32; SIDE] = core::array::from_fn(|i| {
-                let chord = top * (chords[i] + ends[i]);
-                let sum = ARC_OVER_CHORD * (along * chords[i] + top * ends[i]) + chord * turns[i];
-                // 2 asin(s / 2) <= s + 0.1427 s³ up to 2, where the bound is more than any cell's.
+            let [low, center, high] = [0.0, 0.5, 1.0].map(|share| math::sqrt(v + (j as f32 + share) * stride));
+            for i in 0..SIDE {
+                let chord = high * (chords[i] + ends[i]);
+                let sum = ARC_OVER_CHORD * ((center - low) * chords[i] + high * ends[i]) + chord * turns[i];
+                // 2 asin(s / 2) <= s + 0.1427 s³ up to 2, where the bound is more than any texel's.
                 let angle = sum + 0.1427 * (sum * sum * sum);
-                if chord < LARGEST_CHORD { angle } else { f32::INFINITY }
-            });
-            let row = |k: usize| core::array::from_fn(|i| points[k][j * SIDE + i]);
-            let found = EnvironmentView::texels_of_lanes(&[row(0), row(1)], &environment.cover_sizes(&angles));
-            texels[j * SIDE..][..SIDE].copy_from_slice(&found);
+                let angle = if chord < LARGEST_CHORD { angle } else { f32::INFINITY };
+                let point = [step.points[0][j * SIDE + i], step.points[1][j * SIDE + i]];
+                texels[j * SIDE + i] =
+                    EnvironmentView::texel_in_level(point, EnvironmentView::cover_size(angle, finest));
+            }
         }
         texels
     }
 
     /// The arcs along one edge of each column.
     #[inline(always)]
-    fn edges(&self, cell: &GridCell, side: f64, is_shared: bool) -> SphericalColumns<SIDE> {
+    fn edges(&self, cell: &GridCell, side: f64, is_shared: bool, edges: &mut SphericalColumns) {
         let ([u, _], [width, _]) = (cell.corner(), cell.size());
         let triangles = self.visible.triangles();
         if is_shared {
-            let step = width * (1.0 / HALF as f64);
-            let [first, second] =
-                [0, 1].map(|part: usize| widened(&triangles[part].columns::<HALF>(u + side * step, step)));
-            joined(first, &second)
+            let stride = width * (1.0 / HALF as f64);
+            triangles[0].columns::<0, HALF>(u + side * stride, stride, edges);
+            triangles[1].columns::<HALF, HALF>(u + side * stride, stride, edges);
         } else {
-            let step = width * (1.0 / SIDE as f64);
-            triangles[cell.part].columns::<SIDE>(u + side * step, step)
+            let stride = width * (1.0 / SIDE as f64);
+            triangles[cell.part].columns::<0, SIDE>(u + side * stride, stride, edges);
         }
     }
 }
 
-impl Columns {
-    /// Puts the first half of the columns of another after those of this one.
-    #[inline(always)]
-    fn append(&mut self, other: &Self) {
-        for (to, from) in self.poles.iter_mut().zip(&other.poles) {
-            to[HALF..].copy_from_slice(&from[..HALF]);
-        }
-        self.arcs = joined(self.arcs, &other.arcs);
-        self.solid_angles[HALF..].copy_from_slice(&other.solid_angles[..HALF]);
-        self.least[HALF..].copy_from_slice(&other.least[..HALF]);
-        self.sizes[HALF..].copy_from_slice(&other.sizes[..HALF]);
-    }
-}
-
-/// Puts columns into the first lanes.
+/// Distance between two points of lane `i`.
 #[inline(always)]
-fn widened<const COLUMNS: usize>(arcs: &SphericalColumns<COLUMNS>) -> SphericalColumns<SIDE> {
-    let lanes = |values: &[f32; COLUMNS]| {
-        let mut lanes = [0.0; SIDE];
-        lanes[..COLUMNS].copy_from_slice(values);
-        lanes
-    };
-    SphericalColumns {
-        ends: [lanes(&arcs.ends[0]), lanes(&arcs.ends[1]), lanes(&arcs.ends[2])],
-        toward: [lanes(&arcs.toward[0]), lanes(&arcs.toward[1]), lanes(&arcs.toward[2])],
-        versines: lanes(&arcs.versines),
-    }
-}
-
-/// The first halves of both.
-#[inline(always)]
-fn joined(mut first: SphericalColumns<SIDE>, second: &SphericalColumns<SIDE>) -> SphericalColumns<SIDE> {
-    for k in 0..3 {
-        first.ends[k][HALF..].copy_from_slice(&second.ends[k][..HALF]);
-        first.toward[k][HALF..].copy_from_slice(&second.toward[k][..HALF]);
-    }
-    first.versines[HALF..].copy_from_slice(&second.versines[..HALF]);
-    first
+fn distance(a: &[[f32; SIDE]; 3], b: &[[f32; SIDE]; 3], i: usize) -> f32 {
+    let [x, y, z] = [a[0][i] - b[0][i], a[1][i] - b[1][i], a[2][i] - b[2][i]];
+    math::sqrt(x * x + y * y + z * z)
 }
 
 #[cfg(test)]

@@ -232,14 +232,19 @@ impl Kernel for SampleDirection<'_, '_> {
         if !view.resolves_directions() {
             return Some(sample_uniformly(view, &grid, u));
         }
-        Some(grid.draw(u).and_then(|(direction, cell, pdf)| {
-            let (barycentrics, _) = geometry::cross_plane(view.exact_vertices, direction)?;
-            let point = Lattice::inside(barycentrics);
-            let relative = view.point(point);
-            let pdf = density(view, &grid, relative, Some((cell, pdf)))?;
-            Some(DrawnPoint { point, relative, pdf })
-        }))
+        Some(sample_grid(view, &grid, u))
     }
+}
+
+/// Draws a point by the cells of a grid.
+#[inline(always)]
+fn sample_grid(view: &TriangleView<'_>, grid: &SphericalGrid<'_>, u: [Variate; 2]) -> Option<DrawnPoint> {
+    let (direction, cell, pdf) = grid.draw(u)?;
+    let (barycentrics, _) = geometry::cross_plane(view.exact_vertices, direction)?;
+    let point = Lattice::inside(barycentrics);
+    let relative = view.point(point);
+    let pdf = density(view, grid, relative, Some((cell, pdf)))?;
+    Some(DrawnPoint { point, relative, pdf })
 }
 
 /// Draws a point so near that neighbors of the lattice are seen in very different directions: one direction is as likely as

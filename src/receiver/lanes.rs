@@ -44,14 +44,10 @@ impl ReceiverLanes {
         Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack }
     }
 
-    /// Returns the mean weights of small cells of directions by the cosines of their central directions to the normal.
-    /// `least` are those of [`ReceiverKind::least_over_directions`](super::ReceiverKind::least_over_directions).
+    /// Returns the mean weight of a small cell of directions by the cosine of its central direction to the normal. `least`
+    /// is that of [`ReceiverKind::least_over_directions`](super::ReceiverKind::least_over_directions).
     #[inline(always)]
-    pub(crate) fn weights_of_cells<const LANES: usize>(
-        &self,
-        cosines: &[f32; LANES],
-        least: &[f32; LANES],
-    ) -> [f32; LANES] {
-        core::array::from_fn(|i| at_least(f32::from_bits(cosines[i].to_bits() & self.cosine_bits), least[i]))
+    pub(crate) fn weight_of_cell(&self, cosine: f32, least: f32) -> f32 {
+        at_least(f32::from_bits(cosine.to_bits() & self.cosine_bits), least)
     }
 }

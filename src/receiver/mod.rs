@@ -139,7 +139,7 @@ pub(crate) trait ReceiverKind: Copy {
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32;
 
     /// Returns the least mean weight of a small cell of directions, of which the central one is weighed
-    /// ([`ReceiverLanes::weights_of_cells`]). It stands in for what the other directions of the cell weigh.
+    /// ([`ReceiverLanes::weight_of_cell`]). It stands in for what the other directions of the cell weigh.
     fn least_over_directions(self, solid_angle: f32) -> f32;
 
     /// Returns what the loop over the lanes of a node needs.

@@ -6,6 +6,8 @@ mod spherical_triangle;
 pub(crate) mod triangle;
 pub(crate) mod variate;
 
-pub(crate) use discrete::{keep_least, keep_possible, pick, pick_pair, pick_wide, pmf, pmf_wide, sum, within_range};
-pub(crate) use spherical_triangle::{SphericalColumns, SphericalTriangle};
+pub(crate) use discrete::{
+    keep_least, keep_positive, keep_possible, pick, pick_pair, pick_wide, pmf, pmf_wide, sum, within_range,
+};
+pub(crate) use spherical_triangle::{COLUMNS, SphericalColumns, SphericalTriangle};
 pub(crate) use variate::{Variate, seed};

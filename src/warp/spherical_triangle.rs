@@ -23,6 +23,9 @@ use crate::math::{at_least, sqrt, sqrt64};
 /// Larger: columns of small triangles would be wrong. Smaller: a quotient could be infinite.
 const LEAST_SQUARE: f32 = 1e-36;
 
+/// Most columns of cells that are found at once: lanes of a vector.
+pub(crate) const COLUMNS: usize = 8;
+
 /// A spherical triangle around the origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SphericalTriangle {
@@ -41,9 +44,9 @@ pub(crate) struct SphericalTriangle {
     tan_half: f64,
 }
 
-/// What all points of one column of cells share.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SphericalColumns<const COLUMNS: usize> {
+/// What all points of each column of cells share.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SphericalColumns {
     /// Ends of the arcs through the centers of the columns, by coordinate.
     pub(crate) ends: [[f32; COLUMNS]; 3],
     /// Unit vectors perpendicular to the common start of the arcs, towards their ends, by coordinate.
@@ -133,22 +136,26 @@ impl SphericalTriangle {
         [u, v]
     }
 
-    /// Returns columns whose centers have the `u` of `first`, `first + step`, and so on.
+    /// Writes `COUNT` columns from the column `START` on, whose centers have the `u` of `first`, `first + step`, and so on.
     #[inline(always)]
-    pub(crate) fn columns<const COLUMNS: usize>(&self, first: f64, step: f64) -> SphericalColumns<COLUMNS> {
+    pub(crate) fn columns<const START: usize, const COUNT: usize>(
+        &self,
+        first: f64,
+        step: f64,
+        columns: &mut SphericalColumns,
+    ) {
         let (sin_step, cos_step) = sin_cos(0.5 * self.solid_angle * step);
         let (mut sin, mut cos) = sin_cos(0.5 * self.solid_angle * first);
-        let (mut sines, mut cosines) = ([0.0; COLUMNS], [0.0; COLUMNS]);
-        for i in 0..COLUMNS {
+        let (mut sines, mut cosines) = ([0.0; COUNT], [0.0; COUNT]);
+        for i in 0..COUNT {
             (sines[i], cosines[i]) = (sin as f32, cos as f32);
             (sin, cos) = (sin * cos_step + cos * sin_step, cos * cos_step - sin * sin_step);
         }
         let (sin_alpha, cos_alpha, tan_half) = (self.sin_alpha as f32, self.cos_alpha as f32, self.tan_half as f32);
         let (a, b, across) = (self.a.as_vec3(), self.b.as_vec3(), self.across.as_vec3());
-        let mut columns =
-            SphericalColumns { ends: [[0.0; COLUMNS]; 3], toward: [[0.0; COLUMNS]; 3], versines: [0.0; COLUMNS] };
+        let SphericalColumns { ends, toward, versines } = columns;
         // As in `direction`.
-        for i in 0..COLUMNS {
+        for i in 0..COUNT {
             let s = sines[i];
             let d = tan_half * at_least(sin_alpha * cosines[i] - cos_alpha * s, 0.0);
             let (d2, s2) = (d * d, s * s);
@@ -159,11 +166,10 @@ impl SphericalTriangle {
             let m = 0.5 * (dx * dx + dy * dy + dz * dz);
             let (px, py, pz) = (dx + b.x * m, dy + b.y * m, dz + b.z * m);
             let r = 1.0 / sqrt(at_least(px * px + py * py + pz * pz, LEAST_SQUARE));
-            (columns.ends[0][i], columns.ends[1][i], columns.ends[2][i]) = (ex, ey, ez);
-            (columns.toward[0][i], columns.toward[1][i], columns.toward[2][i]) = (px * r, py * r, pz * r);
-            columns.versines[i] = m;
+            (ends[0][START + i], ends[1][START + i], ends[2][START + i]) = (ex, ey, ez);
+            (toward[0][START + i], toward[1][START + i], toward[2][START + i]) = (px * r, py * r, pz * r);
+            versines[START + i] = m;
         }
-        columns
     }
 }
 
@@ -176,21 +182,25 @@ fn positive(x: f64) -> f64 {
 /// Returns sine and cosine of an angle in `[0, π]`, within 1e-12; the sine of a small angle to the same relative error.
 #[inline(always)]
 fn sin_cos(angle: f64) -> (f64, f64) {
+    // Reciprocal factorials.
+    const S3: f64 = -1.0 / 6.0;
+    const S5: f64 = -S3 / 20.0;
+    const S7: f64 = -S5 / 42.0;
+    const S9: f64 = -S7 / 72.0;
+    const S11: f64 = -S9 / 110.0;
+    const S13: f64 = -S11 / 156.0;
+    const C2: f64 = 1.0 / 2.0;
+    const C4: f64 = -C2 / 12.0;
+    const C6: f64 = -C4 / 30.0;
+    const C8: f64 = -C6 / 56.0;
+    const C10: f64 = -C8 / 90.0;
+    const C12: f64 = -C10 / 132.0;
+    const C14: f64 = -C12 / 182.0;
     // The series of a quarter of the angle, doubled twice.
     let h = 0.25 * angle;
     let q = h * h;
-    let sin = h
-        * (1.0
-            - q * (1.0 / 6.0)
-                * (1.0
-                    - q * (1.0 / 20.0)
-                        * (1.0 - q * (1.0 / 42.0) * (1.0 - q * (1.0 / 72.0) * (1.0 - q * (1.0 / 110.0) * (1.0 - q * (1.0 / 156.0)))))));
-    let versine = q * 0.5
-        * (1.0
-            - q * (1.0 / 12.0)
-                * (1.0
-                    - q * (1.0 / 30.0)
-                        * (1.0 - q * (1.0 / 56.0) * (1.0 - q * (1.0 / 90.0) * (1.0 - q * (1.0 / 132.0) * (1.0 - q * (1.0 / 182.0)))))));
+    let sin = h * (1.0 + q * (S3 + q * (S5 + q * (S7 + q * (S9 + q * (S11 + q * S13))))));
+    let versine = q * (C2 + q * (C4 + q * (C6 + q * (C8 + q * (C10 + q * (C12 + q * C14))))));
     let cos = 1.0 - versine;
     let (sin, cos) = (2.0 * sin * cos, 1.0 - 2.0 * sin * sin);
     (2.0 * sin * cos, 1.0 - 2.0 * sin * sin)

@@ -119,7 +119,9 @@ fn columns_are_those_of_single_directions() {
             if triangle.solid_angle() < 1e-6 {
                 continue;
             }
-            let columns = triangle.columns::<8>(1.0 / 16.0, 1.0 / 8.0);
+            let mut columns = SphericalColumns::default();
+            triangle.columns::<0, 4>(1.0 / 16.0, 1.0 / 8.0, &mut columns);
+            triangle.columns::<4, 4>(9.0 / 16.0, 1.0 / 8.0, &mut columns);
             for i in 0..8 {
                 let end = triangle.direction([(i as f64 + 0.5) / 8.0, 1.0]);
                 let found = DVec3::from_array(columns.ends.map(|end| f64::from(end[i])));
