@@ -12,6 +12,7 @@ mod feature_sampling;
 mod feature_texel;
 mod features;
 mod image;
+mod lanes;
 mod lat_long;
 mod pyramid;
 mod resample;
@@ -28,6 +29,7 @@ pub use descend::EnvironmentSample;
 pub(crate) use feature_texel::FeatureTexel;
 pub(crate) use features::BrightFeature;
 pub use image::{EnvironmentImage, Poles};
+pub(crate) use lanes::texel_of;
 pub use view::{Environment, EnvironmentView};
 pub(crate) use weighted::DirectionDistribution;
 

@@ -167,7 +167,7 @@ impl<'a> PointSampler<'a> {
 /// Everything that a host needs to know of a point that was drawn.
 #[inline(always)]
 fn light_sample(at: &Viewpoint<'_>, drawn: &Drawn, view: &LightView<'_>) -> Option<LightSample> {
-    let relative = view.point(drawn.point.point);
+    let relative = drawn.relative;
     let distance = relative.length();
     let positive = drawn.pdf > 0.0 && distance > 0.0 && distance.is_finite();
     positive.then(|| LightSample {
