@@ -5,7 +5,7 @@ use glam::Vec2;
 use crate::blas::barycentric::{LATTICE, LatticeCell};
 use crate::blas::build::texture::Texture;
 use crate::error::{Error, ErrorKind};
-use crate::math::{floor64, sqrt64};
+use crate::math::{floor_to_i64, sqrt64};
 
 /// Texture coordinates may be this large. *Proved*: up to here texel indices stay exact, and beyond it an `f32` cannot
 /// tell the texels of a larger image apart anyway.
@@ -103,7 +103,7 @@ pub(crate) struct TexelFootprint {
 
 impl TexelFootprint {
     fn new(corners: [[f64; 2]; 3], slack: [f64; 2]) -> Self {
-        let origin = core::array::from_fn(|k| floor64(bounds(&corners, k).0) as i64);
+        let origin = core::array::from_fn(|k| floor_to_i64(bounds(&corners, k).0));
         let corners = corners.map(|c| [c[0] - origin[0] as f64, c[1] - origin[1] as f64]);
         let (x, y) = (bounds(&corners, 0), bounds(&corners, 1));
         let normals = core::array::from_fn(|k| {
@@ -120,6 +120,11 @@ impl TexelFootprint {
     pub(crate) fn double_area(&self) -> f64 {
         let [a, b, c] = self.corners;
         ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs()
+    }
+
+    /// The edges' normals, each with the ends of the triangle along it.
+    pub(crate) fn normals(&self) -> [([f64; 2], [f64; 2]); 3] {
+        self.normals
     }
 
     /// Whether the closed triangle meets a closed box. Works for triangles without area, too.

@@ -13,6 +13,7 @@ mod procedural;
 mod pyramid;
 mod texture;
 mod touched;
+mod window;
 
 pub(crate) use footprint::check_uv;
 pub(crate) use image::build;

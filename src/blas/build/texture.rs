@@ -80,6 +80,11 @@ impl<'a> Texture<'a> {
         self.texels[y as usize * self.width as usize + x as usize]
     }
 
+    /// Successive texels of a row of the image itself.
+    pub(crate) fn run(&self, x: usize, y: usize, len: usize) -> &[f32] {
+        &self.texels[y * self.width as usize + x..][..len]
+    }
+
     /// A texel of the wrapped plane.
     pub(crate) fn fetch(&self, x: i64, y: i64) -> f32 {
         self.texel(wrap_index(self.wrap[0], x, self.width), wrap_index(self.wrap[1], y, self.height))

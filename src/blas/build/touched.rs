@@ -3,7 +3,8 @@
 use crate::blas::build::axis::{TexelRun, stretches};
 use crate::blas::build::footprint::TexelFootprint;
 use crate::blas::build::pyramid::TexturePyramid;
-use crate::math::floor64;
+use crate::blas::build::window::SmallWindow;
+use crate::math::floor_to_i64;
 use crate::record::Filter;
 
 /// Minimum and maximum of the touched texels. Every lookup in the footprint lies between them.
@@ -45,13 +46,21 @@ pub(crate) fn range(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, ex
     let texture = pyramid.texture();
     let support = support(texture.filtering());
     let reach = footprint.slack.map(|slack| slack + support);
+    let ends: [[i64; 2]; 2] = core::array::from_fn(|k| {
+        let end = |at: f64| footprint.origin[k] + floor_to_i64(at);
+        [end(footprint.lo[k] - reach[k]), end(footprint.hi[k] + reach[k])]
+    });
+    let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
+    if span <= f64::from(2 * FOOTPRINT_BLOCKS) {
+        if let Some(window) = SmallWindow::new(texture, ends) {
+            return range_in_window(&window, footprint, reach, exact);
+        }
+    }
     let along = |k: usize| {
-        let from = footprint.origin[k] + floor64(footprint.lo[k] - reach[k]) as i64;
-        let to = footprint.origin[k] + floor64(footprint.hi[k] + reach[k]) as i64;
+        let [from, to] = ends[k];
         stretches(texture.wrapping()[k], texture.size()[k], from, to, footprint.origin[k])
     };
     let (columns, rows) = (along(0), along(1));
-    let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
     let finest =
         (0..pyramid.top()).take_while(|level| span > f64::from((2 * FOOTPRINT_BLOCKS) << level)).count() as u32;
     let range = TexelRange { min: f32::INFINITY, max: 0.0 };
@@ -68,6 +77,44 @@ pub(crate) fn range(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, ex
         let whole = pyramid.whole();
         TexelRange { min: whole.min, max: whole.max }
     }
+}
+
+/// Returns the range over a footprint that touches no texels outside of a window.
+fn range_in_window(window: &SmallWindow, footprint: &TexelFootprint, reach: [f64; 2], exact: bool) -> TexelRange {
+    let (min, max) = window.ends();
+    if min == max {
+        return TexelRange { min, max };
+    }
+    // The corners' own texels are touched for certain. Often they tell all.
+    let place = |at: f64, k: usize| (floor_to_i64(at) + footprint.origin[k] - window.first[k]).max(0) as usize;
+    let mut range = TexelRange { min: f32::INFINITY, max: 0.0 };
+    for [x, y] in footprint.corners {
+        let value = window.texel(place(x, 0).min(window.size[0] - 1), place(y, 1).min(window.size[1] - 1));
+        range = TexelRange { min: range.min.min(value), max: range.max.max(value) };
+    }
+    if !exact && range.min < range.max {
+        return range;
+    }
+    // A texel's square, grown, meets the triangle if its center lies within these bounds along every normal.
+    let half = reach.map(|reach| 0.5 + reach);
+    let bounds = footprint.normals().map(|(n, [lo, hi])| {
+        let grown = n[0].abs() * half[0] + n[1].abs() * half[1];
+        (n, lo - grown, hi + grown)
+    });
+    let [x0, y0]: [f64; 2] = core::array::from_fn(|k| (window.first[k] - footprint.origin[k]) as f64 + 0.5);
+    for row in 0..window.size[1] {
+        for column in 0..window.size[0] {
+            let value = window.texel(column, row);
+            if value >= range.min && value <= range.max {
+                continue;
+            }
+            let (x, y) = (x0 + column as f64, y0 + row as f64);
+            if bounds.iter().all(|(n, lo, hi)| (*lo..=*hi).contains(&(n[0] * x + n[1] * y))) {
+                range = TexelRange { min: range.min.min(value), max: range.max.max(value) };
+            }
+        }
+    }
+    range
 }
 
 struct RangeSearch<'a> {

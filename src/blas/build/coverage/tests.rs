@@ -113,12 +113,3 @@ fn a_bright_texel_far_away_costs_no_precision() {
         assert!((average_of(&pyramid, uv).0 - 1e-3).abs() < 1e-9);
     }
 }
-
-#[test]
-fn weights_of_a_half_square() {
-    let half = FootprintPolygon::new([[2.0, 3.0], [3.0, 3.0], [2.0, 4.0]]);
-    let [w00, w10, w01, w11] = bilinear_weights(&half, [2.0, 3.0]);
-    assert!((w11 - 1.0 / 24.0).abs() < 1e-15);
-    assert!((w10 - 1.0 / 8.0).abs() < 1e-15 && (w01 - 1.0 / 8.0).abs() < 1e-15);
-    assert!((w00 + w10 + w01 + w11 - 0.5).abs() < 1e-15);
-}
