@@ -49,27 +49,11 @@ impl<C: Coordinate, const CAPACITY: usize> Polygon<C, CAPACITY> {
     /// Returns the part where `side`, a linear function of the point, is not negative.
     #[inline]
     pub(crate) fn clip(&self, side: impl Fn([C; 2]) -> C) -> Self {
-        self.clip_with(side, |cut| cut)
-    }
-
-    /// Returns the part on one side of a line along an axis: where the coordinate of the other axis is at least `at`,
-    /// or at most that if `sign` is minus one. New vertices lie on the line exactly.
-    #[inline]
-    pub(crate) fn clip_axis(&self, axis: usize, at: C, sign: C) -> Self {
-        let snap = |mut cut: [C; 2]| {
-            cut[axis] = at;
-            cut
-        };
-        self.clip_with(|point| sign * (point[axis] - at), snap)
-    }
-
-    #[inline]
-    fn clip_with(&self, side: impl Fn([C; 2]) -> C, snap: impl Fn([C; 2]) -> [C; 2]) -> Self {
         let zero = C::default();
         let mut out = Self::empty();
         self.for_each_edge(side, |(a, da), (b, db)| {
             if (da < zero) != (db < zero) {
-                out.push(snap(crossing((a, da), (b, db))));
+                out.push(crossing((a, da), (b, db)));
             }
             if db >= zero {
                 out.push(b);
@@ -158,8 +142,9 @@ mod tests {
     #[test]
     fn clipped_area() {
         let triangle = Polygon::new([[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]);
-        let strip =
-            |polygon: Polygon<f64, 12>, axis, lo, hi| polygon.clip_axis(axis, lo, 1.0).clip_axis(axis, hi, -1.0);
+        let strip = |polygon: Polygon<f64, 12>, axis: usize, lo: f64, hi: f64| {
+            polygon.clip(|point| point[axis] - lo).clip(|point| hi - point[axis])
+        };
         assert_eq!(area(triangle), 8.0);
         assert_eq!(area(strip(triangle, 0, 1.0, 2.0)), 2.5);
         assert_eq!(area(strip(strip(triangle, 0, 1.0, 2.0), 1, 0.0, 1.0)), 1.0);

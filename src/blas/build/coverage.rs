@@ -38,12 +38,18 @@ const LINE_AREA: f64 = 1e-9;
 const GAUSS: f64 = 0.577_350_269_189_625_8;
 
 /// The average over a footprint in which lookups lie in `range`, from 0 to
-/// [`MAX_AVERAGE`](crate::blas::node::MAX_AVERAGE).
+/// [`MAX_AVERAGE`](crate::blas::node::MAX_AVERAGE). `window` is the footprint's
+/// [`window`](crate::blas::build::touched::window).
 ///
 /// It is zero exactly where the whole touched range is black. Otherwise it is a normal number between the range's
 /// ends, and exact (up to rounding, and up to a floor of a millionth of the brightest texel) for footprints of up to
 /// about 48 texels.
-pub(crate) fn average(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, range: TexelRange) -> f32 {
+pub(super) fn average(
+    pyramid: &TexturePyramid<'_>,
+    footprint: &TexelFootprint,
+    range: TexelRange,
+    window: Option<&SmallWindow>,
+) -> f32 {
     if range.is_constant() {
         return storable(f64::from(range.max));
     }
@@ -57,7 +63,7 @@ pub(crate) fn average(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, 
     } else if texels(footprint) > EXACT_TEXELS {
         blocks(pyramid, footprint)
     } else {
-        exact(pyramid, footprint, range.max)
+        exact(pyramid, footprint, range.max, window)
     };
     let (min, max) = (f64::from(range.min), f64::from(range.max));
     // NaN, from a footprint that lost its area to rounding, becomes the floor here.
@@ -71,24 +77,49 @@ fn texels(footprint: &TexelFootprint) -> f64 {
 }
 
 /// The mean over a footprint of up to about [`EXACT_TEXELS`].
-fn exact(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, brightest: f32) -> f64 {
+fn exact(
+    pyramid: &TexturePyramid<'_>,
+    footprint: &TexelFootprint,
+    brightest: f32,
+    window: Option<&SmallWindow>,
+) -> f64 {
     let texture = pyramid.texture();
-    let filter = texture.filtering();
-    let margin = match filter {
-        Filter::Nearest => 0.0,
-        Filter::Bilinear => 0.5,
-    };
+    let is_nearest = texture.filtering() == Filter::Nearest;
+    if let Some(window) = window {
+        return if is_nearest {
+            integrated::<_, true>(window, footprint, brightest)
+        } else {
+            integrated::<_, false>(window, footprint, brightest)
+        };
+    }
+    let margin = if is_nearest { 0.0 } else { 0.5 };
     let ends = core::array::from_fn(|k| {
-        let first = footprint.origin[k] + floor_to_i64(footprint.lo[k] - margin);
-        // One more, in case rounding takes a corner across the last line.
-        [first, footprint.origin[k] + floor_to_i64(footprint.hi[k] + margin) + 1]
+        let end = |at: f64| footprint.origin[k] + floor_to_i64(at);
+        [end(footprint.lo[k] - margin), end(footprint.hi[k] + margin)]
     });
-    if let Some(window) = SmallWindow::new(texture, ends) {
-        integrated(&window, filter, footprint, brightest)
-    } else if let Some(window) = LargeWindow::new(texture, ends) {
-        integrated(&window, filter, footprint, brightest)
-    } else {
-        looked_up(pyramid, footprint)
+    match LargeWindow::new(texture, ends) {
+        Some(window) if is_nearest => integrated::<_, true>(&window, footprint, brightest),
+        Some(window) => integrated::<_, false>(&window, footprint, brightest),
+        None => looked_up(pyramid, footprint),
+    }
+}
+
+/// A place of the grid between whose lines the image is a polynomial: the corner of a texel, or its center.
+#[derive(Clone, Copy, Default)]
+struct GridNode {
+    /// The integral along the row from the window's first node.
+    before: f64,
+    /// The image's value to the right of the node.
+    value: f64,
+    /// Half of what the image gains up to the next node.
+    half_gain: f64,
+}
+
+impl GridNode {
+    /// The integral along the row up to a place `x` behind the node.
+    #[inline(always)]
+    fn integral(&self, x: f64) -> f64 {
+        self.before + x * (self.value + x * self.half_gain)
     }
 }
 
@@ -96,67 +127,50 @@ fn exact(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, brightest: f3
 ///
 /// With `F(x, y)` the integral of the image along the row `y`, from the window's left edge to `x`, the integral over the
 /// footprint is that of `F dy` along its edges. Between grid lines `F` is a polynomial of at most third degree along an
-/// edge, so that two points of Gauss's rule integrate it exactly.
+/// edge, so that two points of Gauss's rule integrate it exactly; with nearest lookup it is linear, and its middle does.
 ///
 /// Texels above `brightest` are not touched. They count as that, so that what they add and subtract again is not larger
 /// than the result.
-fn integrated<const CAPACITY: usize>(
+fn integrated<const CAPACITY: usize, const NEAREST: bool>(
     window: &Window<CAPACITY>,
-    filter: Filter,
     footprint: &TexelFootprint,
     brightest: f32,
 ) -> f64 {
-    // Nodes of the grid between whose lines the image is a polynomial: corners of texels, or their centers.
-    let shift = match filter {
-        Filter::Nearest => 0.0,
-        Filter::Bilinear => 0.5,
-    };
+    let shift = if NEAREST { 0.0 } else { 0.5 };
     let offset: [f64; 2] = core::array::from_fn(|k| (footprint.origin[k] - window.first[k]) as f64 - shift);
     let corners = footprint.corners.map(|corner| [corner[0] + offset[0], corner[1] + offset[1]]);
-    let texel = |column: usize, row: usize| f64::from(window.texel(column, row).min(brightest));
     let [width, height] = window.size;
-    // Integrals along the rows of nodes, up to each node.
-    let mut before = [0.0; CAPACITY];
-    for row in 0..height {
-        let mut sum = 0.0;
-        for column in 1..width {
-            let (left, right) = (texel(column - 1, row), texel(column, row));
-            sum += match filter {
-                Filter::Nearest => left,
-                Filter::Bilinear => 0.5 * (left + right),
-            };
-            before[row * width + column] = sum;
+    let mut nodes = [GridNode::default(); CAPACITY];
+    for (row, nodes) in nodes.chunks_exact_mut(width).take(height).enumerate() {
+        let texels = window.row(row);
+        let clamped = |texel: f32| f64::from(if texel < brightest { texel } else { brightest });
+        let (mut before, mut value) = (0.0, clamped(texels[0]));
+        for (column, node) in nodes.iter_mut().enumerate() {
+            let next = clamped(texels[(column + 1).min(width - 1)]);
+            let half_gain = if NEAREST { 0.0 } else { 0.5 * (next - value) };
+            *node = GridNode { before, value, half_gain };
+            before += value + half_gain;
+            value = next;
         }
     }
-    let along_row = |row: usize, column: usize, x: f64| {
-        let left = texel(column, row);
-        let start = before[row * width + column];
-        match filter {
-            Filter::Nearest => start + x * left,
-            Filter::Bilinear => start + x * (left + 0.5 * x * (texel(column + 1, row) - left)),
-        }
-    };
+    // Rounding could take a corner across the window's rim; polynomials hold a little beyond their square, too.
+    let last = [width, height].map(|n| n.saturating_sub(if NEAREST { 1 } else { 2 }) as i64);
     let mut sum = 0.0;
     for (from, to) in [(0, 1), (1, 2), (2, 0)] {
         for_each_piece(corners[from], corners[to], |[column, row], p, q| {
-            let middle = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
-            let column = (column.max(0) as usize).min(width.saturating_sub(1));
-            let row = (row.max(0) as usize).min(height - 1);
-            sum += (q[1] - p[1])
-                * match filter {
-                    Filter::Nearest => along_row(row, column, middle[0] - column as f64),
-                    Filter::Bilinear => {
-                        // A host may look half a texel beyond the footprint: the window holds the next node.
-                        let (column, row) = (column.min(width.saturating_sub(2)), row.min(height.saturating_sub(2)));
-                        let half = [0.5 * (q[0] - p[0]) * GAUSS, 0.5 * (q[1] - p[1]) * GAUSS];
-                        let at = |sign: f64| {
-                            let x = middle[0] + sign * half[0] - column as f64;
-                            let y = middle[1] + sign * half[1] - row as f64;
-                            (1.0 - y) * along_row(row, column, x) + y * along_row(row + 1, column, x)
-                        };
-                        0.5 * (at(-1.0) + at(1.0))
-                    }
-                };
+            let [column, row] = [column.clamp(0, last[0]), row.clamp(0, last[1])];
+            let at = row as usize * width + column as usize;
+            let (x, y) = (0.5 * (p[0] + q[0]) - column as f64, 0.5 * (p[1] + q[1]) - row as f64);
+            let mean = if NEAREST {
+                nodes[at].integral(x)
+            } else {
+                // The next row is in the window, which holds what bilinear lookup touches.
+                let (above, below) = (&nodes[at], &nodes[(at + width).min(CAPACITY - 1)]);
+                let (dx, dy) = (0.5 * GAUSS * (q[0] - p[0]), 0.5 * GAUSS * (q[1] - p[1]));
+                let along = |x: f64, y: f64| (1.0 - y) * above.integral(x) + y * below.integral(x);
+                0.5 * (along(x - dx, y - dy) + along(x + dx, y + dy))
+            };
+            sum += (q[1] - p[1]) * mean;
         });
     }
     let [a, b, c] = corners;

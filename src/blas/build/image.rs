@@ -94,11 +94,12 @@ pub(crate) fn build(pyramid: &mut TexturePyramid<'_>, uv: [Vec2; 3], pool: &mut 
     }
     let uv_triangle = UvTriangle::new(pyramid.texture(), uv);
     let footprint = uv_triangle.footprint(LatticeCell::whole());
-    let range = touched::range(pyramid, &footprint, true);
+    let window = touched::window(pyramid, &footprint);
+    let range = touched::range(pyramid, &footprint, window.as_ref());
     let memory = TreeBudget::new(&uv_triangle, pyramid);
     let nodes = memory.nodes(&uv_triangle, pyramid.texture());
     if range.is_constant() || nodes == 0 {
-        return Ok(Root::constant(average(pyramid, &footprint, range)));
+        return Ok(Root::constant(average(pyramid, &footprint, range, window.as_ref())));
     }
     let fine = levels(&uv_triangle);
     let [sharp, blurred] = EXTRA_HALVINGS;
@@ -106,7 +107,7 @@ pub(crate) fn build(pyramid: &mut TexturePyramid<'_>, uv: [Vec2; 3], pool: &mut 
     let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_HALVINGS / LEVEL_HALVINGS);
     debug_assert!(LATTICE >> (deepest * LEVEL_HALVINGS) >= 16);
     let source = ImageOnTriangle { pyramid, uv_triangle: &uv_triangle };
-    let Ok(tree) = grow(&source, range, &GrowthLimits { nodes, fine, deepest, variance: IMAGE_VARIANCE });
+    let Ok(tree) = grow(&source, &GrowthLimits { nodes, fine, deepest, variance: IMAGE_VARIANCE });
     let (root, bytes) = tree.store(pool)?;
     pyramid.extra -= (bytes - memory.own).max(0.0).min(pyramid.extra);
     Ok(root)
@@ -121,12 +122,15 @@ struct ImageOnTriangle<'a> {
 impl WeightSource for ImageOnTriangle<'_> {
     type Fault = Infallible;
 
-    fn range(&self, cell: LatticeCell, exact: bool) -> Result<TexelRange, Infallible> {
-        Ok(touched::range(self.pyramid, &self.uv_triangle.footprint(cell), exact))
+    fn constant(&self, cell: LatticeCell) -> Result<Option<f32>, Infallible> {
+        Ok(touched::constant(self.pyramid, &self.uv_triangle.footprint(cell)))
     }
 
-    fn average(&self, cell: LatticeCell, range: TexelRange) -> Result<f32, Infallible> {
-        Ok(average(self.pyramid, &self.uv_triangle.footprint(cell), range))
+    fn measure(&self, cell: LatticeCell) -> Result<(TexelRange, f32), Infallible> {
+        let footprint = self.uv_triangle.footprint(cell);
+        let window = touched::window(self.pyramid, &footprint);
+        let range = touched::range(self.pyramid, &footprint, window.as_ref());
+        Ok((range, average(self.pyramid, &footprint, range, window.as_ref())))
     }
 
     fn spread(&self) -> f64 {

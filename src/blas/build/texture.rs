@@ -114,9 +114,14 @@ impl<'a> Texture<'a> {
     }
 }
 
-/// The texel of an `n` texels long axis that an index outside of it stands for.
+/// The texel of an `n` texels long axis that an index inside or outside of it stands for.
+#[inline]
 pub(crate) fn wrap_index(wrap: Wrap, index: i64, n: u32) -> u32 {
     let n = i64::from(n);
+    // Most are inside, and divisions are slow.
+    if (0..n).contains(&index) {
+        return index as u32;
+    }
     let wrapped = match wrap {
         Wrap::Repeat => index.rem_euclid(n),
         Wrap::Mirror => {

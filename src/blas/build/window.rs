@@ -16,11 +16,11 @@ pub(super) struct Window<const CAPACITY: usize> {
 ///
 /// A budget of time: larger ones are slower to fill, and smaller ones send more footprints down the pyramid. No result
 /// depends on the capacity.
-pub(super) type SmallWindow = Window<64>;
+pub(super) type SmallWindow = Window<36>;
 
 /// A window for every footprint that is integrated exactly. *Proved*: such a footprint is at most 24 texels long, and
-/// reads 28 texels along an axis.
-pub(super) type LargeWindow = Window<784>;
+/// reads 27 texels along an axis.
+pub(super) type LargeWindow = Window<729>;
 
 impl<const CAPACITY: usize> Window<CAPACITY> {
     /// Reads the texels between the first and the last along each axis. `None` if they are more than `CAPACITY`.

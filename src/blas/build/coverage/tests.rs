@@ -5,7 +5,7 @@ use super::*;
 use crate::blas::barycentric::LatticeCell;
 use crate::blas::build::footprint::UvTriangle;
 use crate::blas::build::texture::Texture;
-use crate::blas::build::touched::range;
+use crate::blas::build::touched::{range, window};
 use crate::record::Wrap;
 use crate::testing::Pcg32;
 
@@ -13,8 +13,9 @@ const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 
 fn average_of(pyramid: &TexturePyramid<'_>, uv: [Vec2; 3]) -> (f64, TexelRange) {
     let footprint = UvTriangle::new(pyramid.texture(), uv).footprint(LatticeCell::whole());
-    let range = range(pyramid, &footprint, true);
-    (f64::from(average(pyramid, &footprint, range)), range)
+    let window = window(pyramid, &footprint);
+    let range = range(pyramid, &footprint, window.as_ref());
+    (f64::from(average(pyramid, &footprint, range, window.as_ref())), range)
 }
 
 /// Lookups at the centers of `n²` cells: mean, least and greatest.
