@@ -52,6 +52,16 @@ pub(crate) struct GrownTree {
 }
 
 impl GrownTree {
+    /// One weight for the whole triangle.
+    pub(super) fn constant(average: f32) -> Self {
+        Self { average, averages: Vec::new(), divided: Vec::new() }
+    }
+
+    /// Number of nodes.
+    pub(super) fn nodes(&self) -> usize {
+        self.divided.len() / ARITY
+    }
+
     /// Adds the tree to the pool. Returns its root and the bytes that it takes.
     pub(super) fn store(&self, pool: &mut Vec<CellBlock>) -> Result<(Root, f64), Error> {
         if self.divided.is_empty() || self.average == 0.0 {

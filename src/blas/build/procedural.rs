@@ -196,7 +196,8 @@ impl<'a> FunctionOnTriangle<'a> {
 
 impl FunctionOnTriangle<'_> {
     /// What the function says that it lies between over a cell.
-    fn range(&self, cell: LatticeCell) -> Result<TexelRange, Fault> {        let region = self.region(cell);
+    fn range(&self, cell: LatticeCell) -> Result<TexelRange, Fault> {
+        let region = self.region(cell);
         let [min, max] = self.function.bounds(region[0], region[1]);
         // NaN fails every comparison.
         if !(min >= 0.0 && min <= max && max < f32::INFINITY) {

@@ -65,6 +65,11 @@ impl<'a> Texture<'a> {
         [self.width, self.height]
     }
 
+    /// Number of texels.
+    pub(crate) fn texels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
     /// How the host reads between texel centers.
     pub(crate) fn filtering(&self) -> Filter {
         self.filter
