@@ -13,7 +13,8 @@ pub struct Error(pub(crate) ErrorKind);
 
 impl Error {
     /// Whether it is no mistake but the host's own wish, given by what it passed to
-    /// [`build_with`](crate::LightSamplerBuilder::build_with).
+    /// [`build_with`](crate::LightSamplerBuilder::build_with) or
+    /// [`Environment::new_with`](crate::Environment::new_with).
     pub fn is_cancelled(&self) -> bool {
         self.0 == ErrorKind::Cancelled
     }

@@ -62,27 +62,6 @@ impl<C: Coordinate, const CAPACITY: usize> Polygon<C, CAPACITY> {
         out
     }
 
-    /// Returns the parts where `side`, a linear function of the point, is negative and where it is positive.
-    #[inline]
-    pub(crate) fn split(&self, side: impl Fn([C; 2]) -> C) -> (Self, Self) {
-        let zero = C::default();
-        let (mut negative, mut positive) = (Self::empty(), Self::empty());
-        self.for_each_edge(side, |(a, da), (b, db)| {
-            if da * db < zero {
-                let cut = crossing((a, da), (b, db));
-                negative.push(cut);
-                positive.push(cut);
-            }
-            if db <= zero {
-                negative.push(b);
-            }
-            if db >= zero {
-                positive.push(b);
-            }
-        });
-        (negative, positive)
-    }
-
     /// Visits the ends of every edge, each with its value of `side`. The first edge ends at the first vertex.
     #[inline(always)]
     fn for_each_edge(&self, side: impl Fn([C; 2]) -> C, mut visit: impl FnMut(([C; 2], C), ([C; 2], C))) {
@@ -150,15 +129,5 @@ mod tests {
         assert_eq!(area(strip(strip(triangle, 0, 1.0, 2.0), 1, 0.0, 1.0)), 1.0);
         assert_eq!(area(strip(triangle, 1, 5.0, 6.0)), 0.0);
         assert_eq!(area(triangle.clip(|[x, y]| x + y - 2.0)), 6.0);
-    }
-
-    #[test]
-    fn parts_add_up() {
-        let square = Polygon::new([[5.0, 7.0], [6.0, 7.0], [6.0, 8.0], [5.0, 8.0]]);
-        let (below, above) = square.split(|[x, y]| x + y - 12.25);
-        assert!((area(below) - 0.03125).abs() < 1e-15 && (area(above) - 0.96875).abs() < 1e-15);
-        let (nothing, all) = square.split(|[x, _]| x - 5.0);
-        assert_eq!((area(nothing), area(all)), (0.0, 1.0));
-        assert_eq!(area(Polygon::empty().split(|[x, _]| x).0), 0.0);
     }
 }
