@@ -55,33 +55,32 @@ pub(crate) struct Drawn {
     pub(crate) pdf: f64,
 }
 
-impl Mixture {
-    /// Finds out what each technique accounts for at a shading point.
+impl Default for Mixture {
+    /// The trees alone.
     #[inline(always)]
-    pub(crate) fn new(at: &Viewpoint<'_>) -> Self {
-        let mut mixture = Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } };
-        if at.scene.has_features() {
-            mixture.balance(at);
-        }
-        mixture
+    fn default() -> Self {
+        Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } }
     }
+}
 
+impl Mixture {
     /// Looks for features, and balances them with the trees.
     #[inline(never)]
-    fn balance(&mut self, at: &Viewpoint<'_>) {
-        let features = self.features.insert(VisibleFeatures::default());
+    pub(crate) fn balanced(at: &Viewpoint<'_>) -> Self {
+        let mut mixture = Self { features: Some(VisibleFeatures::default()), ..Self::default() };
+        let Some(features) = &mut mixture.features else { return mixture };
         features.find(at);
         let seen = features.irradiance();
         if !(seen > 0.0 && seen < MAX_IRRADIANCE) {
-            self.features = None;
-            return;
+            return Self::default();
         }
         let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
-        self.first = at.scene.tlas.first_weights(&at.x, at);
-        let rest = trees::irradiance(at, self.first.as_ref());
-        self.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
-        let total = f64::from(seen) + f64::from(self.rest);
-        self.shares = Shares { trees: f64::from(self.rest) / total, features: 1.0 / total };
+        mixture.first = at.scene.tlas.first_weights(at);
+        let rest = trees::irradiance(at, mixture.first.as_ref());
+        mixture.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
+        let total = f64::from(seen) + f64::from(mixture.rest);
+        mixture.shares = Shares { trees: f64::from(mixture.rest) / total, features: 1.0 / total };
+        mixture
     }
 
     /// Returns the mixture for single samples: one technique is chosen.

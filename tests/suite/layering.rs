@@ -153,7 +153,8 @@ fn violations(file: &Path, source: &str) -> Vec<String> {
         }
     }
     // A way around: `super` up to the root of the crate.
-    let is_root_of_module = file.components().count() == 1 || file.ends_with("mod.rs");
+    let depth = file.components().count();
+    let is_root_of_module = depth == 1 || depth == 2 && file.ends_with("mod.rs");
     for at in words(&chars, "super") {
         let starts_line = {
             let start = (0..at).rev().find(|&i| chars[i] == '\n').map_or(0, |i| i + 1);
@@ -221,5 +222,9 @@ fn imports_from_above_and_from_siblings_are_found() {
     assert_eq!(count("blas/a.rs", "use super::super::tlas;"), 1);
     assert_eq!(count("blas/mod.rs", "use super::tlas;"), 1);
     assert_eq!(count("blas/a.rs", "use super::node;"), 0);
+    assert_eq!(count("blas/walk/mod.rs", "use super::node;"), 0);
+    assert_eq!(count("blas/walk/mod.rs", "use super::super::tlas;"), 1);
+    assert_eq!(count("buffers.rs", "use crate::error::Error;"), 0);
+    assert_eq!(count("buffers.rs", "use crate::math;"), 1);
     assert_eq!(count("stray.rs", ""), 1);
 }

@@ -1,5 +1,6 @@
 //! Trees over images on triangles: how deep they go and how much memory they may take.
 
+use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 use core::convert::Infallible;
 
@@ -103,15 +104,11 @@ pub(crate) struct ImageTree<'a> {
     pub(crate) uv: [Vec2; 3],
 }
 
-/// Returns the units of work of [`build_images`].
+/// Returns the units of work of [`build_images`], for trees in any order.
 pub(crate) fn image_work(trees: &[ImageTree<'_>]) -> f64 {
-    let work = |at: usize| {
-        let ImageTree { image, texture, uv } = &trees[at];
-        let is_first = at == 0 || trees[at - 1].texture != *texture;
-        let pyramid = if is_first { image.texels() / TEXELS_PER_UNIT } else { 0 };
-        pyramid as f64 + units(image, *uv) as f64
-    };
-    parallel::sum(trees.len(), work)
+    let images: BTreeMap<u32, u64> = trees.iter().map(|tree| (tree.texture, tree.image.texels())).collect();
+    let pyramids: u64 = images.values().map(|texels| texels / TEXELS_PER_UNIT).sum();
+    pyramids as f64 + parallel::sum(trees.len(), |i| units(&trees[i].image, trees[i].uv) as f64)
 }
 
 /// Units of work of one tree.
