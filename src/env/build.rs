@@ -78,7 +78,7 @@ impl Environment {
         } else {
             BrightFeatures::find(depth, finest(depth, &image), limits)
         };
-        let pyramid = Pyramid::new(depth.max(1), image, features.cap);
+        let pyramid = Pyramid::new(depth.max(1), image, &features.rest);
         let [low, high] = pyramid.ranges[0];
         if depth == 0 || low == high {
             return Ok(Self::uniform(pyramid.means[0], source.clamped));
@@ -87,7 +87,7 @@ impl Environment {
     }
 
     fn uniform(radiance: f32, clamped_texels: u32) -> Self {
-        let pyramid = Pyramid::new(0, vec![radiance], f32::INFINITY);
+        let pyramid = Pyramid::new(0, vec![radiance], &[]);
         Self::from_pyramid(0, pyramid, BrightFeatures::none(), clamped_texels)
     }
 
@@ -97,7 +97,7 @@ impl Environment {
         let rotation = Mat3::IDENTITY.to_cols_array_2d();
         let header = EnvironmentHeader { rotation, depth, mean, max, clamped_texels, cap: features.cap };
         let Pyramid { means, ranges, filtered } = pyramid;
-        let BrightFeatures { features, texels: feature_texels, .. } = features;
+        let BrightFeatures { nodes: features, texels: feature_texels, .. } = features;
         Self { header, means, ranges, filtered, features, feature_texels }
     }
 

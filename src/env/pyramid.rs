@@ -27,8 +27,12 @@ pub(super) struct Pyramid {
 impl Pyramid {
     /// Builds all levels of an image of `2^depth` texels a side. Its texels are 0 or in `[1e-30, 1e30]`, and
     /// stand at the end of `means`, which has room for all levels. Ranges and filtered means are those of the image
-    /// capped at `cap`.
-    pub(super) fn new(depth: u32, mut means: Vec<f32>, cap: f32) -> Self {
+    /// with some texels, by number, replaced by what remains of them without the bright features.
+    pub(super) fn new(depth: u32, mut means: Vec<f32>, rest: &[(u32, f32)]) -> Self {
+        let mut capped = (!rest.is_empty()).then(|| means.clone());
+        for &(texel, value) in rest {
+            capped.iter_mut().for_each(|capped| capped[level_start(depth) + texel as usize] = value);
+        }
         let mut ranges = vec![[0.0; 2]; level_start(depth)];
         for d in (0..depth).rev() {
             let size = 1_u32 << d;
@@ -37,7 +41,7 @@ impl Pyramid {
                     let at = level_start(d) + ((y << d) | x) as usize;
                     means[at] = parent_mean(children(&means, d, x, y));
                     ranges[at] = if d + 1 == depth {
-                        parent_range(children(&means, d, x, y).map(|v| [v.min(cap); 2]))
+                        parent_range(children(capped.as_ref().unwrap_or(&means), d, x, y).map(|v| [v; 2]))
                     } else {
                         parent_range(children(&ranges, d, x, y))
                     };
@@ -45,7 +49,7 @@ impl Pyramid {
             }
         }
         let mut filtered = Vec::with_capacity(means.len());
-        let capped = (cap < f32::INFINITY).then(|| capped_means(depth, &means, cap));
+        capped.iter_mut().for_each(|capped| fill_means(depth, capped));
         let image = capped.as_ref().unwrap_or(&means);
         for d in 0..=depth {
             filter(d, &image[level_start(d)..level_start(d + 1)], &mut filtered);
@@ -54,16 +58,14 @@ impl Pyramid {
     }
 }
 
-/// Means of all levels of the capped image.
-fn capped_means(depth: u32, means: &[f32], cap: f32) -> Vec<f32> {
-    let mut capped: Vec<f32> = means.iter().map(|&v| v.min(cap)).collect();
+/// Fills in the means of all levels but the finest.
+fn fill_means(depth: u32, means: &mut [f32]) {
     for d in (0..depth).rev() {
         for texel in 0..1_u32 << (2 * d) {
             let (x, y) = (texel & ((1 << d) - 1), texel >> d);
-            capped[level_start(d) + texel as usize] = parent_mean(children(&capped, d, x, y));
+            means[level_start(d) + texel as usize] = parent_mean(children(means, d, x, y));
         }
     }
-    capped
 }
 
 /// The four texels below a texel of depth `d`, row by row.

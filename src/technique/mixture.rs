@@ -28,9 +28,8 @@ const MAX_IRRADIANCE: f32 = 1e35;
 pub(crate) struct Mixture {
     /// Weights of the tree's first choice, where balancing the techniques has taken them.
     first: Option<FirstWeights>,
-    /// The features that are visible. `None` where there is none: a list would take longer to write than many a sample to
-    /// draw.
-    features: Option<VisibleFeatures>,
+    /// The features that are visible.
+    features: VisibleFeatures,
     /// Estimate of the irradiance that the trees account for.
     rest: f32,
     shares: Shares,
@@ -59,7 +58,12 @@ impl Mixture {
     /// Finds out what each technique accounts for at a shading point.
     #[inline(always)]
     pub(crate) fn new(at: &Viewpoint<'_>) -> Self {
-        let mut mixture = Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } };
+        let mut mixture = Self {
+            first: None,
+            features: VisibleFeatures::default(),
+            rest: 1.0,
+            shares: Shares { trees: 1.0, features: 0.0 },
+        };
         if at.scene.has_features() {
             mixture.balance(at);
         }
@@ -69,11 +73,11 @@ impl Mixture {
     /// Looks for features, and balances them with the trees.
     #[inline(never)]
     fn balance(&mut self, at: &Viewpoint<'_>) {
-        let features = self.features.insert(VisibleFeatures::default());
+        let features = &mut self.features;
         features.find(at);
         let seen = features.irradiance();
         if !(seen > 0.0 && seen < MAX_IRRADIANCE) {
-            self.features = None;
+            features.truncate(0);
             return;
         }
         let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
@@ -92,7 +96,7 @@ impl Mixture {
 
     /// Returns the mixture for a split tree: the trees in any case, and one feature next to them.
     pub(crate) fn side_by_side<'m>(&'m self, splitting: &'m Splitting) -> Mixed<'m> {
-        let features = self.features.as_ref().map_or(0.0, |features| 1.0 / features.total());
+        let features = if self.features.is_empty() { 0.0 } else { 1.0 / self.features.total() };
         let trees = Trees { first: self.first.as_ref(), splitting: Some(splitting) };
         Mixed { trees, mixture: self, shares: Shares { trees: 1.0, features } }
     }
@@ -115,7 +119,8 @@ impl Mixed<'_> {
         mut u: Variates,
         then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
-        if let Some(features) = &self.mixture.features {
+        let features = &self.mixture.features;
+        if !features.is_empty() {
             if pick_pair([features.total() as f32, self.mixture.rest], &mut u.choice) == 0 {
                 return self.sample_feature(at, u, then);
             }
@@ -143,7 +148,10 @@ impl Mixed<'_> {
         u: Variates,
         then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
-        let features = self.mixture.features.as_ref()?;
+        let features = &self.mixture.features;
+        if features.is_empty() {
+            return None;
+        }
         features.sample(at, u, |point, features, view| {
             let trees = self.trees.density(at, point, view);
             then(&self.mix(point, trees, features), view)
@@ -163,10 +171,11 @@ impl Mixed<'_> {
     /// Adds the density by the features to that by the trees.
     #[inline(always)]
     fn complete(&self, at: &Viewpoint<'_>, point: LightPoint, trees: Density, view: &LightView<'_>) -> Drawn {
-        match &self.mixture.features {
-            None => self.mix(point, trees, Density { pmf: 0.0, pdf: 0.0 }),
-            Some(features) => self.mix(point, trees, features.density(at, point, view)),
+        let features = &self.mixture.features;
+        if features.is_empty() {
+            return self.mix(point, trees, Density { pmf: 0.0, pdf: 0.0 });
         }
+        self.mix(point, trees, features.density(at, point, view))
     }
 
     #[inline(always)]
