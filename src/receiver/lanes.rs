@@ -5,11 +5,12 @@ use glam::Vec3;
 
 use crate::geometry::HORIZON_ROUNDING;
 
-/// Least expected cosine at a surface of a cluster that is not culled.
+/// Least expected cosine of a cluster that is not culled, at the receiver and at the lights. It keeps every light possible
+/// that may be visible.
 ///
-/// Measured on cloud-10000 (docs/ACCURACY.md, "Tuned constants"). Larger values send samples to clusters at the horizon;
-/// smaller ones leave a cluster whose mean is below the horizon too few samples for what rises above it.
-pub(super) const LEAST_LANE_COSINE: f32 = 1e-3;
+/// *Measured* on cloud-10000 (docs/ACCURACY.md, "Moments"). A larger value wastes samples on clusters seen edge-on; a smaller
+/// one makes their samples rarer and brighter.
+pub(crate) const LEAST_CLUSTER_COSINE: f32 = 1e-3;
 
 /// A shading point prepared for the vector loop over the lanes of a node.
 pub(crate) struct ReceiverLanes {

@@ -13,7 +13,7 @@ mod volume;
 
 use glam::Vec3;
 
-pub(crate) use lanes::ReceiverLanes;
+pub(crate) use lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use surface::Surface;
 use transmissive::Transmissive;
 use volume::Volume;
@@ -86,6 +86,12 @@ impl ShadingPoint {
     #[must_use]
     pub fn cosine(&self, direction: Vec3) -> f32 {
         self.receiver.weight(direction)
+    }
+
+    /// Returns the point prepared for the loop over the lanes of a node.
+    #[inline(always)]
+    pub(crate) fn lanes(&self) -> ReceiverLanes {
+        self.receiver.lanes(self.position)
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::lambert::lambert;
-use super::lanes::{LEAST_LANE_COSINE, ReceiverLanes};
+use super::lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use super::{CornerHeights, ReceiverKind};
 use crate::geometry::is_below;
 
@@ -58,6 +58,6 @@ impl ReceiverKind for Surface {
     #[inline(always)]
     fn lanes(self, position: Vec3) -> ReceiverLanes {
         let normal = self.normal;
-        ReceiverLanes::new(position, normal, u32::MAX, LEAST_LANE_COSINE, normal, 0.0)
+        ReceiverLanes::new(position, normal, u32::MAX, LEAST_CLUSTER_COSINE, normal, 0.0)
     }
 }

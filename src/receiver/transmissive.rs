@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::lambert::lambert;
-use super::lanes::{LEAST_LANE_COSINE, ReceiverLanes};
+use super::lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use super::{CornerHeights, ReceiverKind};
 
 #[derive(Clone, Copy)]
@@ -56,6 +56,6 @@ impl ReceiverKind for Transmissive {
     #[inline(always)]
     fn lanes(self, position: Vec3) -> ReceiverLanes {
         // All bits of the cosine but its sign: both sides receive.
-        ReceiverLanes::new(position, self.normal, u32::MAX >> 1, LEAST_LANE_COSINE, Vec3::ZERO, 1.0)
+        ReceiverLanes::new(position, self.normal, u32::MAX >> 1, LEAST_CLUSTER_COSINE, Vec3::ZERO, 1.0)
     }
 }

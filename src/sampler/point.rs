@@ -104,7 +104,6 @@ impl<'a> PointSampler<'a> {
         let mixed = &self.mixture.side_by_side(splitting);
         let mut visits = 0;
         self.at.scene.tlas.sample_split(
-            &self.at.x,
             &self.at,
             splitting,
             |draw| variate(draw, 0),

@@ -81,7 +81,7 @@ impl Mixture {
             return;
         }
         let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
-        self.first = at.scene.tlas.first_weights(&at.x, at);
+        self.first = at.scene.tlas.first_weights(at);
         let rest = trees::irradiance(at, self.first.as_ref());
         self.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
         let total = f64::from(seen) + f64::from(self.rest);

@@ -18,8 +18,8 @@ impl Trees<'_> {
     /// Returns the probability of a light, or the expected number of visits if the tree is split.
     pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: u32) -> f64 {
         match self.splitting {
-            None => at.scene.tlas.pmf(leaf, &at.x, at, self.first),
-            Some(splitting) => at.scene.tlas.expected_count(leaf, &at.x, at, splitting),
+            None => at.scene.tlas.pmf(leaf, at, self.first),
+            Some(splitting) => at.scene.tlas.expected_count(leaf, at, splitting),
         }
     }
 
@@ -53,7 +53,7 @@ impl Technique for Trees<'_> {
         u: Variates,
         then: impl FnOnce(LightPoint, Density, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
-        let (leaf, pmf) = at.scene.tlas.sample(&at.x, at, self.first, u.choice)?;
+        let (leaf, pmf) = at.scene.tlas.sample(at, self.first, u.choice)?;
         self.sample_on(at, leaf, pmf, u.point, then)
     }
 

@@ -67,6 +67,11 @@ impl Viewpoint<'_> {
 
 impl LeafOracle for Viewpoint<'_> {
     #[inline(always)]
+    fn shading_point(&self) -> &ShadingPoint {
+        &self.x
+    }
+
+    #[inline(always)]
     fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
         let mean = self.scene.environment.mean_without_features();
         if mean <= 0.0 {

@@ -6,14 +6,15 @@ use core::ops::ControlFlow;
 #[cfg(feature = "rayon")]
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-/// What a host is told while lights are built: the share that is done, from 0 to 1.
+/// Called with the share of the build that is done, from 0 to 1.
 pub(crate) type Report<'a> = &'a (dyn Fn(f32) -> ControlFlow<()> + Sync);
 
 /// The host does not want the result any more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cancelled;
 
-/// Share of the work that is done once all lights have found their place.
+/// Share of the build time after which all lights have found their place; the rest is the collapse and the bounds. Only
+/// shown to the host: chosen, not measured.
 const PLACED: f32 = 0.9;
 
 /// Counts the lights that have found their place, if a host wants to know.
@@ -42,7 +43,7 @@ impl<'a> Progress<'a> {
     }
 }
 
-/// A count from here on means that the host has cancelled.
+/// Count from which on the host has cancelled. *Format*: the highest bit, which no number of lights reaches.
 const CANCELLED: usize = 1 << (usize::BITS - 1);
 
 /// A number that all threads add to; without threads a plain one, which every target has.
