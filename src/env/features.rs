@@ -38,7 +38,7 @@ pub(super) struct FeatureLimits {
     /// Least share of the flux in all features together. Larger: a faint sun stays in the rest. Smaller: features that
     /// are not worth the search for them.
     pub(super) flux_share: f64,
-    /// Largest share of the image's texels above the cap. Larger: features that the pyramid resolves as well, as what
+    /// Largest share of the image's texels in features. Larger: features that the pyramid resolves as well, as what
     /// fills this share has at most the inverse contrast. Smaller: many lamps stay in the rest.
     pub(super) image_share: f64,
     /// Most features. Larger: more memory. Smaller: of more lamps, the weaker ones stay in the rest.
@@ -100,9 +100,10 @@ impl BrightFeatures {
         let flux = mean(f64::INFINITY);
         // Twice: the first cap is still raised by the features themselves.
         let mut cap = limits.contrast * mean(limits.contrast * flux);
-        let most = (limits.image_share * image.len() as f64) as usize;
+        let most = ((limits.image_share * image.len() as f64) as usize).max(1);
+        // To where the next doubling would leave room.
         for _ in 0..MAX_DOUBLINGS {
-            if image.iter().filter(|&&v| f64::from(v) > cap).count() <= most.max(1) {
+            if image.iter().filter(|&&v| f64::from(v) > 2.0 * cap).count() <= most {
                 break;
             }
             cap *= 2.0;
@@ -119,6 +120,12 @@ impl BrightFeatures {
         let excess =
             |cluster: &Cluster| cluster.texels.iter().map(|&(_, v)| f64::from(v) - f64::from(cluster.cap)).sum::<f64>();
         clusters.sort_by(|a, b| excess(b).total_cmp(&excess(a)));
+        let mut room = most;
+        clusters.retain(|cluster| {
+            let fits = cluster.texels.len() <= room;
+            room -= if fits { cluster.texels.len() } else { 0 };
+            fits
+        });
         clusters.truncate(limits.features);
         let found: f64 = clusters.iter().map(excess).sum();
         if clusters.is_empty() || found < limits.flux_share * flux * image.len() as f64 {

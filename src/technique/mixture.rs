@@ -28,8 +28,8 @@ const MAX_IRRADIANCE: f32 = 1e35;
 pub(crate) struct Mixture {
     /// Weights of the tree's first choice, where balancing the techniques has taken them.
     first: Option<FirstWeights>,
-    /// The features that are visible.
-    features: VisibleFeatures,
+    /// The features that are visible. `None` where there is none: moving a list takes longer than many a sample.
+    features: Option<VisibleFeatures>,
     /// Estimate of the irradiance that the trees account for.
     rest: f32,
     shares: Shares,
@@ -58,34 +58,32 @@ impl Mixture {
     /// Finds out what each technique accounts for at a shading point.
     #[inline(always)]
     pub(crate) fn new(at: &Viewpoint<'_>) -> Self {
-        let mut mixture = Self {
-            first: None,
-            features: VisibleFeatures::default(),
-            rest: 1.0,
-            shares: Shares { trees: 1.0, features: 0.0 },
-        };
-        if at.scene.has_features() {
-            mixture.balance(at);
-        }
-        mixture
+        if at.scene.has_features() { Self::balanced(at) } else { Self::of_trees() }
     }
 
-    /// Looks for features, and balances them with the trees.
+    /// The trees alone.
+    #[inline(always)]
+    fn of_trees() -> Self {
+        Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } }
+    }
+
+    /// Looks for features, and balances them with the trees. Returned as a whole, so that it is built in its place: it is
+    /// large, and most of it is seldom written.
     #[inline(never)]
-    fn balance(&mut self, at: &Viewpoint<'_>) {
-        let features = &mut self.features;
+    fn balanced(at: &Viewpoint<'_>) -> Self {
+        let mut features = VisibleFeatures::default();
         features.find(at);
         let seen = features.irradiance();
         if !(seen > 0.0 && seen < MAX_IRRADIANCE) {
-            features.truncate(0);
-            return;
+            return Self::of_trees();
         }
         let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
-        self.first = at.scene.tlas.first_weights(at);
-        let rest = trees::irradiance(at, self.first.as_ref());
-        self.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
-        let total = f64::from(seen) + f64::from(self.rest);
-        self.shares = Shares { trees: f64::from(self.rest) / total, features: 1.0 / total };
+        let first = at.scene.tlas.first_weights(at);
+        let rest = trees::irradiance(at, first.as_ref());
+        let rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
+        let total = f64::from(seen) + f64::from(rest);
+        let shares = Shares { trees: f64::from(rest) / total, features: 1.0 / total };
+        Self { first, features: Some(features), rest, shares }
     }
 
     /// Returns the mixture for single samples: one technique is chosen.
@@ -96,7 +94,7 @@ impl Mixture {
 
     /// Returns the mixture for a split tree: the trees in any case, and one feature next to them.
     pub(crate) fn side_by_side<'m>(&'m self, splitting: &'m Splitting) -> Mixed<'m> {
-        let features = if self.features.is_empty() { 0.0 } else { 1.0 / self.features.total() };
+        let features = self.features.as_ref().map_or(0.0, |features| 1.0 / features.total());
         let trees = Trees { first: self.first.as_ref(), splitting: Some(splitting) };
         Mixed { trees, mixture: self, shares: Shares { trees: 1.0, features } }
     }
@@ -119,8 +117,7 @@ impl Mixed<'_> {
         mut u: Variates,
         then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
-        let features = &self.mixture.features;
-        if !features.is_empty() {
+        if let Some(features) = &self.mixture.features {
             if pick_pair([features.total() as f32, self.mixture.rest], &mut u.choice) == 0 {
                 return self.sample_feature(at, u, then);
             }
@@ -148,10 +145,7 @@ impl Mixed<'_> {
         u: Variates,
         then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
-        let features = &self.mixture.features;
-        if features.is_empty() {
-            return None;
-        }
+        let features = self.mixture.features.as_ref()?;
         features.sample(at, u, |point, features, view| {
             let trees = self.trees.density(at, point, view);
             then(&self.mix(point, trees, features), view)
@@ -171,11 +165,10 @@ impl Mixed<'_> {
     /// Adds the density by the features to that by the trees.
     #[inline(always)]
     fn complete(&self, at: &Viewpoint<'_>, point: LightPoint, trees: Density, view: &LightView<'_>) -> Drawn {
-        let features = &self.mixture.features;
-        if features.is_empty() {
-            return self.mix(point, trees, Density { pmf: 0.0, pdf: 0.0 });
+        match &self.mixture.features {
+            None => self.mix(point, trees, Density { pmf: 0.0, pdf: 0.0 }),
+            Some(features) => self.mix(point, trees, features.density(at, point, view)),
         }
-        self.mix(point, trees, features.density(at, point, view))
     }
 
     #[inline(always)]

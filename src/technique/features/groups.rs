@@ -37,28 +37,40 @@ pub(super) struct Groups {
 }
 
 impl Groups {
+    /// No group yet.
+    #[inline(always)]
+    pub(super) fn empty() -> Self {
+        Self { groups: [Group::default(); MAX_GROUPS], len: 0 }
+    }
+
     /// Divides the widest group until all are narrow, or there are as many as there can be.
-    pub(super) fn new(at: &Viewpoint<'_>) -> Self {
-        let mut groups = Self { groups: [Group::default(); MAX_GROUPS], len: 0 };
-        groups.add(0, at);
+    #[inline(always)]
+    pub(super) fn fill(&mut self, at: &Viewpoint<'_>) {
+        self.add(0, at);
+        if at.scene.environment.feature_nodes()[0].is_single == 0 {
+            self.divide(at);
+        }
+    }
+
+    #[inline(never)]
+    fn divide(&mut self, at: &Viewpoint<'_>) {
         let nodes = at.scene.environment.feature_nodes();
         let narrow = if at.scene.lights.len() <= FEW_LIGHTS { GROUP_RADIUS } else { 0.0 };
-        while groups.len < MAX_GROUPS {
+        while self.len < MAX_GROUPS {
             let (mut widest, mut radius) = (None, narrow);
-            for (i, group) in groups.as_slice().iter().enumerate() {
+            for (i, group) in self.as_slice().iter().enumerate() {
                 let node = &nodes[group.node as usize];
                 if node.is_single == 0 && node.sin_radius > radius {
                     (widest, radius) = (Some(i), node.sin_radius);
                 }
             }
             let Some(widest) = widest else { break };
-            let first = groups.groups[widest].node as usize + 1;
-            groups.len -= 1;
-            groups.groups[widest] = groups.groups[groups.len];
-            groups.add(first, at);
-            groups.add(nodes[first].next as usize, at);
+            let first = self.groups[widest].node as usize + 1;
+            self.len -= 1;
+            self.groups[widest] = self.groups[self.len];
+            self.add(first, at);
+            self.add(nodes[first].next as usize, at);
         }
-        groups
     }
 
     pub(super) fn as_slice(&self) -> &[Group] {
@@ -70,8 +82,8 @@ impl Groups {
         let environment = &at.scene.environment;
         let sin_radius = environment.feature_nodes()[node].sin_radius;
         let cosine = at.x.receiver.mean_over_cone(environment.feature_axis(node), sin_radius);
-        // A cone that may hold everything has no horizon, but a mean that is not zero.
-        let cosine = if sin_radius < 1.0 { cosine } else { cosine.max(f32::MIN_POSITIVE) };
+        // A cone that may hold everything has no horizon; its mean is that of a sphere.
+        let cosine = if sin_radius < 1.0 { cosine } else { 0.25 };
         if cosine > 0.0 {
             self.groups[self.len] = Group { node: node as u32, cosine };
             self.len += 1;

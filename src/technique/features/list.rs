@@ -49,12 +49,6 @@ impl VisibleFeatures {
         self.visible.len()
     }
 
-    /// Whether nothing is listed.
-    #[inline]
-    pub(crate) fn is_empty(&self) -> bool {
-        self.visible.is_empty()
-    }
-
     /// Appends a feature. Without room for it, it replaces the last one.
     pub(super) fn push(&mut self, leaf: u32, node: u32, part: FeaturePart, weight: f32) {
         self.truncate(MAX_VISIBLE - 1);
@@ -64,7 +58,7 @@ impl VisibleFeatures {
 
     /// Forgets all but the first entries.
     #[inline]
-    pub(crate) fn truncate(&mut self, len: usize) {
+    fn truncate(&mut self, len: usize) {
         self.visible.truncate(len);
         self.weights.truncate(len);
     }

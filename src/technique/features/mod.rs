@@ -28,7 +28,8 @@ use view::FeatureView;
 impl VisibleFeatures {
     /// Lists all features that are visible from a shading point.
     pub(super) fn find(&mut self, at: &Viewpoint<'_>) {
-        let groups = Groups::new(at);
+        let mut groups = Groups::empty();
+        groups.fill(at);
         let mut left = groups.as_slice().len();
         for group in groups.as_slice() {
             left -= 1;
