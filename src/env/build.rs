@@ -114,7 +114,7 @@ impl Environment {
         } else {
             BrightFeatures::find(depth, finest(depth, &image), limits)
         };
-        let pyramid = Pyramid::new(depth.max(1), image, features.cap, progress)?;
+        let pyramid = Pyramid::new(depth.max(1), image, &features.rest, progress)?;
         let [low, high] = pyramid.ranges[0];
         if depth == 0 || low == high {
             return Ok(Self::uniform(pyramid.means[0], source.clamped));
@@ -133,7 +133,7 @@ impl Environment {
         let rotation = Mat3::IDENTITY.to_cols_array_2d();
         let header = EnvironmentHeader { rotation, depth, mean, max, clamped_texels, cap: features.cap };
         let Pyramid { means, ranges, filtered } = pyramid;
-        let BrightFeatures { features, texels: feature_texels, .. } = features;
+        let BrightFeatures { nodes: features, texels: feature_texels, .. } = features;
         Self { header, means, ranges, filtered, features, feature_texels }
     }
 

@@ -29,35 +29,53 @@ pub(super) struct Pyramid {
 impl Pyramid {
     /// Builds all levels of an image of `2^depth` texels a side. Its texels are 0 or in `[1e-30, 1e30]`, and
     /// stand at the end of `means`, which has room for all levels. Ranges and filtered means are those of the image
-    /// capped at `cap`. Every row of the finest filtered level is a unit of progress.
-    pub(super) fn new(depth: u32, mut means: Vec<f32>, cap: f32, progress: &Progress<'_>) -> Result<Self, Cancelled> {
+    /// with some texels, by number, replaced by what remains of them without the bright features. Every row of the
+    /// finest filtered level is a unit of progress.
+    pub(super) fn new(
+        depth: u32,
+        mut means: Vec<f32>,
+        rest: &[(u32, f32)],
+        progress: &Progress<'_>,
+    ) -> Result<Self, Cancelled> {
         fill_means(depth, &mut means);
         progress.check()?;
-        let mut ranges = vec![[0.0; 2]; level_start(depth)];
-        for d in (0..depth).rev() {
-            let (level, finer) = ranges[..level_start((d + 2).min(depth))].split_at_mut(level_start(d + 1));
-            let finest = &means[level_start(depth)..];
-            for_each_texel(&mut level[level_start(d)..], d, |x, y| {
-                if d + 1 == depth {
-                    parent_range(children_in(finest, d, x, y).map(|v| [v.min(cap); 2]))
-                } else {
-                    parent_range(children_in(finer, d, x, y))
-                }
-            });
-        }
+        // In place and back again: a second image would be a third of the memory.
+        let whole = replace_texels(&mut means[level_start(depth)..], rest);
+        let ranges = ranges_of(depth, &means[level_start(depth)..]);
         progress.check()?;
-        // The finest level is capped as it is read; of the others, which are a third of it, there is a copy.
-        let capped = if cap < f32::INFINITY { capped_means(depth, &means, cap) } else { Vec::new() };
+        let coarser = if rest.is_empty() { Vec::new() } else { coarser_means(depth, &means) };
         let mut filtered = vec![0.0; means.len()];
         for d in 0..=depth {
-            let levels = if d == depth || capped.is_empty() { &means } else { &capped };
+            let levels = if d == depth || coarser.is_empty() { &means } else { &coarser };
             let level = &levels[level_start(d)..level_start(d + 1)];
             let out = &mut filtered[level_start(d)..level_start(d + 1)];
-            filter(d, level, cap, out, (d == depth).then_some(progress));
+            filter(d, level, out, (d == depth).then_some(progress));
         }
         progress.check()?;
+        replace_texels(&mut means[level_start(depth)..], &whole);
         Ok(Self { means, ranges, filtered })
     }
+}
+
+/// Replaces texels by number, and returns what they were.
+fn replace_texels(image: &mut [f32], texels: &[(u32, f32)]) -> Vec<(u32, f32)> {
+    texels.iter().map(|&(texel, value)| (texel, core::mem::replace(&mut image[texel as usize], value))).collect()
+}
+
+/// Returns the ranges of all levels but the finest, which is given.
+fn ranges_of(depth: u32, finest: &[f32]) -> Vec<[f32; 2]> {
+    let mut ranges = vec![[0.0; 2]; level_start(depth)];
+    for d in (0..depth).rev() {
+        let (level, finer) = ranges[..level_start((d + 2).min(depth))].split_at_mut(level_start(d + 1));
+        for_each_texel(&mut level[level_start(d)..], d, |x, y| {
+            if d + 1 == depth {
+                parent_range(children_in(finest, d, x, y).map(|v| [v; 2]))
+            } else {
+                parent_range(children_in(finer, d, x, y))
+            }
+        });
+    }
+    ranges
 }
 
 /// Computes all levels above the finest one.
@@ -68,17 +86,17 @@ fn fill_means(depth: u32, means: &mut [f32]) {
     }
 }
 
-/// Returns the means of all levels of the capped image but the finest.
-fn capped_means(depth: u32, means: &[f32], cap: f32) -> Vec<f32> {
-    let mut capped = vec![0.0; level_start(depth)];
+/// Computes the means of all levels but the finest anew.
+fn coarser_means(depth: u32, means: &[f32]) -> Vec<f32> {
+    let mut coarser = vec![0.0; level_start(depth)];
     if depth > 0 {
         let finest = &means[level_start(depth)..];
-        for_each_texel(&mut capped[level_start(depth - 1)..], depth - 1, |x, y| {
-            parent_mean(children_in(finest, depth - 1, x, y).map(|v| v.min(cap)))
+        for_each_texel(&mut coarser[level_start(depth - 1)..], depth - 1, |x, y| {
+            parent_mean(children_in(finest, depth - 1, x, y))
         });
-        fill_means(depth - 1, &mut capped);
+        fill_means(depth - 1, &mut coarser);
     }
-    capped
+    coarser
 }
 
 /// Computes every texel of a level alone, many rows side by side.
@@ -123,10 +141,10 @@ pub(super) fn parent_range(children: [[f32; 2]; 4]) -> [f32; 2] {
     children.into_iter().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_default()
 }
 
-/// Computes the 3x3 averages of one level, capped.
-fn filter(depth: u32, level: &[f32], cap: f32, filtered: &mut [f32], progress: Option<&Progress<'_>>) {
+/// Computes the 3x3 averages of one level.
+fn filter(depth: u32, level: &[f32], filtered: &mut [f32], progress: Option<&Progress<'_>>) {
     let size = 1_i32 << depth;
-    let value = |at: usize| f64::from(level[at].min(cap));
+    let value = |at: usize| f64::from(level[at]);
     let at = |x: i32, y: i32| -> f64 {
         let (x, y) = wrap_texel_log2(x, y, depth);
         value(((y << depth) | x) as usize)

@@ -24,13 +24,10 @@ pub struct PointSampler<'a> {
 impl<'a> PointSampler<'a> {
     /// Returns the sampler of a viewpoint.
     ///
-    /// To be called with a literal, and itself two literals: what goes through a variable is copied, and a sampler is large.
+    /// To be called with a literal, and itself a literal: what goes through a variable is copied, and a sampler is large.
     #[inline(always)]
     pub(super) fn new(at: Viewpoint<'a>) -> Self {
-        if at.scene.has_features() {
-            return Self { mixture: Mixture::balanced(&at), at };
-        }
-        Self { at, mixture: Mixture::default() }
+        Self { mixture: Mixture::new(&at), at }
     }
 
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the

@@ -30,8 +30,7 @@ const MAX_IRRADIANCE: f32 = 1e35;
 pub(crate) struct Mixture {
     /// Weights of the tree's first choice, where balancing the techniques has taken them.
     first: Option<FirstWeights>,
-    /// The features that are visible. `None` where there is none: a list would take longer to write than many a sample to
-    /// draw.
+    /// The features that are visible. `None` where there is none: moving a list takes longer than many a sample.
     features: Option<VisibleFeatures>,
     /// Estimate of the irradiance that the trees account for.
     rest: f32,
@@ -66,32 +65,36 @@ impl Drawn {
     }
 }
 
-impl Default for Mixture {
+impl Mixture {
+    /// Finds out what each technique accounts for at a shading point.
+    #[inline(always)]
+    pub(crate) fn new(at: &Viewpoint<'_>) -> Self {
+        if at.scene.has_features() { Self::balanced(at) } else { Self::of_trees() }
+    }
+
     /// The trees alone.
     #[inline(always)]
-    fn default() -> Self {
+    fn of_trees() -> Self {
         Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } }
     }
-}
 
-impl Mixture {
-    /// Looks for features, and balances them with the trees.
+    /// Looks for features, and balances them with the trees. Returned as a whole, so that it is built in its place: it is
+    /// large, and most of it is seldom written.
     #[inline(never)]
-    pub(crate) fn balanced(at: &Viewpoint<'_>) -> Self {
-        let mut mixture = Self { features: Some(VisibleFeatures::default()), ..Self::default() };
-        let Some(features) = &mut mixture.features else { return mixture };
+    fn balanced(at: &Viewpoint<'_>) -> Self {
+        let mut features = VisibleFeatures::default();
         features.find(at);
         let seen = features.irradiance();
         if !(seen > 0.0 && seen < MAX_IRRADIANCE) {
-            return Self::default();
+            return Self::of_trees();
         }
         let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
-        mixture.first = at.scene.tlas.first_weights(at);
-        let rest = trees::irradiance(at, mixture.first.as_ref());
-        mixture.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
-        let total = f64::from(seen) + f64::from(mixture.rest);
-        mixture.shares = Shares { trees: f64::from(mixture.rest) / total, features: 1.0 / total };
-        mixture
+        let first = at.scene.tlas.first_weights(at);
+        let rest = trees::irradiance(at, first.as_ref());
+        let rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
+        let total = f64::from(seen) + f64::from(rest);
+        let shares = Shares { trees: f64::from(rest) / total, features: 1.0 / total };
+        Self { first, features: Some(features), rest, shares }
     }
 
     /// Returns the mixture for single samples: one technique is chosen.

@@ -24,7 +24,7 @@ impl<'a> LightScene<'a> {
     /// Whether bright features of the environment may be seen through portals.
     #[inline]
     pub(crate) fn has_features(&self) -> bool {
-        self.lights.has_portals && !self.environment.bright_features().is_empty()
+        self.lights.has_portals && !self.environment.feature_nodes().is_empty()
     }
 
     /// The environment, if what portals show depends on the direction.
