@@ -6,7 +6,7 @@ use core::ops::ControlFlow;
 #[cfg(feature = "rayon")]
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-/// What a host is told during a build: the share that is done, from 0 to 1.
+/// Called with the share of the build that is done, from 0 to 1.
 pub(crate) type Report<'a> = &'a (dyn Fn(f32) -> ControlFlow<()> + Sync);
 
 /// The host does not want the result any more.
@@ -52,10 +52,11 @@ impl<'a> Progress<'a> {
     }
 }
 
-/// Largest share that is reported before the end. Larger would look like the end to a host that rounds.
+/// Largest share that is reported before the end. Only shown to the host: chosen, not measured. Larger would look like the
+/// end to a host that rounds.
 const LARGEST_SHARE: f64 = 0.99;
 
-/// A count from here on means that the host has cancelled. *Proved* to be out of reach: units stand for many bytes each.
+/// Count from which on the host has cancelled. *Format*: the highest bit, which no number of units reaches.
 const CANCELLED: usize = 1 << (usize::BITS - 1);
 
 /// A number that all threads add to; without threads a plain one, which every target has.

@@ -61,7 +61,7 @@ struct PlacedCorner {
 
 /// How a texel covers the cells of one octant.
 #[derive(Default)]
-pub(super) struct Coverage {
+pub(super) struct CellCoverage {
     /// By rows: what edges add to the area of a cell, and to that of the cells before it, for a width of one.
     cells: Vec<[f64; 2]>,
 }
@@ -90,7 +90,7 @@ impl<'a> LatLong<'a> {
     }
 
     /// Mean radiance over texel `(x, y)` of the equal-area image.
-    pub(super) fn texel(&self, coverage: &mut Coverage, x: usize, y: usize) -> f64 {
+    pub(super) fn texel(&self, coverage: &mut CellCoverage, x: usize, y: usize) -> f64 {
         let size = self.size;
         let half = size / 2;
         let (right, top) = (x >= half, y >= half);
@@ -118,7 +118,7 @@ impl<'a> LatLong<'a> {
     }
 
     /// Adds the cells under a convex polygon of one octant, of at most four corners.
-    fn add_octant(&self, coverage: &mut Coverage, corners: &[Corner], octant: Octant, sums: &mut Sums) {
+    fn add_octant(&self, coverage: &mut CellCoverage, corners: &[Corner], octant: Octant, sums: &mut Sums) {
         let side = 2.0 / self.size as f64;
         let columns_a_quarter = 0.25 * self.columns as f64;
         let mut placed = [PlacedCorner::default(); 4];
@@ -217,16 +217,16 @@ impl<'a> LatLong<'a> {
             start = end;
             if row_at <= column_at {
                 if row < to.row {
-                    row += 1
+                    row += 1;
                 } else {
-                    row -= 1
+                    row -= 1;
                 }
                 row_at = next_row(row);
             } else {
                 if column < to.column {
-                    column += 1
+                    column += 1;
                 } else {
-                    column -= 1
+                    column -= 1;
                 }
                 column_at = next_column(column);
             }

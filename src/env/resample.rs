@@ -1,6 +1,6 @@
 //! Resampling of a host's image to an equal-area image whose size is a power of two, by area: no flux is lost.
 
-use super::lat_long::{Coverage, LatLong};
+use super::lat_long::{CellCoverage, LatLong};
 use super::pyramid::level_start;
 use super::source::{Edges, EnvironmentSource};
 use super::{MAX_RADIANCE, MIN_RADIANCE};
@@ -28,7 +28,7 @@ pub(super) fn resample(
     match source.edges() {
         Edges::LatLong(_) => {
             let source = LatLong::new(source, size);
-            fill(image, size, progress, Coverage::default, |coverage, x, y| source.texel(coverage, x, y));
+            fill(image, size, progress, CellCoverage::default, |coverage, x, y| source.texel(coverage, x, y));
         }
         Edges::EqualArea => fill(image, size, progress, || (), |(), x, y| box_mean(source, x, y, size)),
     }
