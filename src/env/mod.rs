@@ -13,6 +13,7 @@ mod feature_texel;
 mod features;
 mod image;
 mod lat_long;
+mod lookup;
 mod pyramid;
 mod resample;
 mod rotation;
@@ -28,6 +29,7 @@ pub use descend::EnvironmentSample;
 pub(crate) use feature_texel::FeatureTexel;
 pub(crate) use features::BrightFeature;
 pub use image::{EnvironmentImage, Poles};
+pub(crate) use lookup::{VectorLookup, direction_to_square};
 pub use view::{Environment, EnvironmentView};
 pub(crate) use weighted::DirectionDistribution;
 
