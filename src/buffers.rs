@@ -32,6 +32,8 @@ pub(crate) const ALIGNMENT: usize = 4;
 #[derive(Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct Tag(pub(crate) [u8; 4]);
 
+const _: () = assert!(size_of::<Tag>() == 4);
+
 impl fmt::Debug for Tag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.escape_ascii().fmt(f)

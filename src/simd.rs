@@ -1,84 +1,86 @@
 //! The same code compiled for wider vector registers, chosen when the program runs.
 //!
-//! A [`Kernel`] is plain code over arrays, which a compiler turns into vectors of the width that
-//! it may use; products and sums are never fused, so the results are the same bits at every level.
+//! A [`Kernel`] is plain code over arrays, which a compiler turns into vectors of the width that it may use. Products
+//! and sums are never fused, so that all instruction sets give the same bits.
+//!
+//! AVX-512 needs a compiler that knows it: `build.rs` sets `fanlight_avx512` where it does.
 
-/// Code that is worth compiling for each level.
+/// Code that is compiled once for each instruction set.
 pub(crate) trait Kernel {
-    /// What comes out.
+    /// Result of the code.
     type Output;
 
-    /// Does the work. Must be `#[inline(always)]`, and so must all that is to profit.
+    /// Runs the code. Must be `#[inline(always)]`, and so must everything in it that is to be compiled for wider
+    /// vectors.
     fn run(self) -> Self::Output;
 }
 
 /// Instructions that this machine has: only asking the machine makes one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct InstructionSet(Extension);
+pub(crate) struct InstructionSet(VectorExtension);
 
 #[derive(Clone, Copy, Debug)]
-enum Extension {
+enum VectorExtension {
     /// What the whole program is compiled for.
     Baseline,
     /// 256-bit vectors.
     #[cfg(all(target_arch = "x86_64", feature = "std"))]
     Avx2,
     /// 512-bit vectors.
-    #[cfg(all(target_arch = "x86_64", feature = "std"))]
+    #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
     Avx512,
 }
 
 impl InstructionSet {
-    /// The widest that this machine has. Cheap, but not free: ask once a traversal.
+    /// Returns the widest set that this machine has. Cheap, but not free: ask once a traversal.
     #[inline(always)]
     pub(crate) fn best() -> Self {
-        #[cfg(all(target_arch = "x86_64", feature = "std"))]
-        {
-            if Extension::Avx512.is_available() {
-                return Self(Extension::Avx512);
-            }
-            if Extension::Avx2.is_available() {
-                return Self(Extension::Avx2);
-            }
+        #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
+        if VectorExtension::Avx512.is_available() {
+            return Self(VectorExtension::Avx512);
         }
-        Self(Extension::Baseline)
+        #[cfg(all(target_arch = "x86_64", feature = "std"))]
+        if VectorExtension::Avx2.is_available() {
+            return Self(VectorExtension::Avx2);
+        }
+        Self(VectorExtension::Baseline)
     }
 
-    /// All that this machine has.
+    /// Returns all sets that this machine has.
     #[cfg(test)]
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         [
-            Extension::Baseline,
+            VectorExtension::Baseline,
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            Extension::Avx2,
-            #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            Extension::Avx512,
+            VectorExtension::Avx2,
+            #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
+            VectorExtension::Avx512,
         ]
         .into_iter()
-        .filter(|set| set.is_available())
+        .filter(|extension| extension.is_available())
         .map(Self)
     }
 
-    /// Does the work with this level's instructions.
+    /// Runs a kernel with these instructions.
     #[inline(always)]
     #[cfg_attr(
         all(target_arch = "x86_64", feature = "std"),
         expect(unsafe_code, reason = "the machine was asked whether it has these instructions")
     )]
-    pub(crate) fn run<W: Kernel>(self, work: W) -> W::Output {
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
-            Extension::Baseline => work.run(),
-            // SAFETY: a level is made only where the machine has it.
+            VectorExtension::Baseline => kernel.run(),
+            // SAFETY: a set is made only where the machine has it.
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            Extension::Avx2 => unsafe { with_avx2(work) },
+            VectorExtension::Avx2 => unsafe { with_avx2(kernel) },
             // SAFETY: as before.
-            #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            Extension::Avx512 => unsafe { with_avx512(work) },
+            #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
+            VectorExtension::Avx512 => unsafe { with_avx512(kernel) },
         }
     }
 }
 
-impl Extension {
+impl VectorExtension {
     #[inline(always)]
     #[cfg_attr(not(all(target_arch = "x86_64", feature = "std")), expect(dead_code, reason = "only tests ask"))]
     fn is_available(self) -> bool {
@@ -86,25 +88,33 @@ impl Extension {
             Self::Baseline => true,
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
             Self::Avx2 => std::is_x86_feature_detected!("avx2"),
-            #[cfg(all(target_arch = "x86_64", feature = "std"))]
+            #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
             Self::Avx512 => std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512vl"),
         }
     }
 }
 
+/// # Safety
+///
+/// The machine must have AVX2. The function is unsafe as a whole for compilers before 1.86.
 #[cfg(all(target_arch = "x86_64", feature = "std"))]
 #[target_feature(enable = "avx2")]
-fn with_avx2<W: Kernel>(work: W) -> W::Output {
-    work.run()
+#[expect(unsafe_code, reason = "the caller has asked the machine")]
+unsafe fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
 }
 
-#[cfg(all(target_arch = "x86_64", feature = "std"))]
+/// # Safety
+///
+/// The machine must have these instructions.
+#[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
 #[target_feature(enable = "avx2,avx512f,avx512vl")]
-fn with_avx512<W: Kernel>(work: W) -> W::Output {
-    work.run()
+#[expect(unsafe_code, reason = "the caller has asked the machine")]
+unsafe fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
 }
 
-/// Asks for a value's cache lines, so that a later look at it does not wait for all of them.
+/// Requests the cache lines of a value, so that a later read does not wait for all of them.
 #[inline(always)]
 #[cfg_attr(target_arch = "x86_64", expect(unsafe_code, reason = "a hint that reads nothing"))]
 pub(crate) fn prefetch<T>(value: &T) {
@@ -118,7 +128,7 @@ pub(crate) fn prefetch<T>(value: &T) {
     let _ = value;
 }
 
-/// The machine's square root, for builds without `std`.
+/// Returns the square root by the machine's instruction, for builds without `std`.
 #[cfg(all(not(feature = "std"), target_arch = "x86_64", target_feature = "sse2"))]
 #[inline(always)]
 #[expect(unsafe_code, reason = "the program is compiled for machines that have this instruction")]

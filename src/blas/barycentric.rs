@@ -21,7 +21,7 @@ pub(crate) const LATTICE: u32 = 1 << LATTICE_BITS;
 /// How often the whole triangle's edge may be halved. *Proved*: see below. A level halves it [`LEVEL_HALVINGS`] times.
 ///
 /// The smallest cell is 16 lattice units wide and still has points strictly inside.
-pub(crate) const MAX_DEPTH: u32 = 20;
+pub(crate) const MAX_HALVINGS: u32 = 20;
 
 /// Cells of a node. *Format*: it decides on the layout of [`CellBlock`](super::node::CellBlock).
 pub(crate) const ARITY: usize = 4;

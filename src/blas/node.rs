@@ -83,6 +83,8 @@ pub(crate) struct Root {
     pub(crate) node: u32,
 }
 
+const _: () = assert!(size_of::<Root>() == 8);
+
 impl Root {
     /// One weight for the whole triangle.
     pub(crate) const fn constant(average: f32) -> Self {

@@ -2,7 +2,7 @@
 
 use alloc::vec;
 
-use crate::blas::barycentric::{ARITY, LEVEL_HALVINGS, MAX_DEPTH};
+use crate::blas::barycentric::{ARITY, LEVEL_HALVINGS, MAX_HALVINGS};
 use crate::blas::node::{BLOCK_CELLS, CellBlock, LEAF, MAX_AVERAGE, Root, averages, below};
 use crate::error::Error;
 
@@ -22,7 +22,7 @@ pub(crate) fn validate(blocks: &[CellBlock]) -> Result<(), Error> {
     if count >= LEAF as usize {
         return Err(Error::bytes("number of nodes", 0, count, LEAF - 1));
     }
-    let max_levels = MAX_DEPTH / LEVEL_HALVINGS;
+    let max_levels = MAX_HALVINGS / LEVEL_HALVINGS;
     // A node's level: how many nodes are above it on the longest way. Ways lead up in the pool only.
     let mut levels = vec![1u8; count];
     for node in 0..count as u32 {

@@ -7,7 +7,7 @@ use super::pyramid::Pyramid;
 use super::resample::resample;
 use super::source::EnvironmentSource;
 use super::view::{Environment, EnvironmentHeader, EnvironmentView};
-use super::{MAX_DEPTH, MAX_RADIANCE, MIN_RADIANCE, rotation};
+use super::{MAX_PYRAMID_DEPTH, MAX_RADIANCE, MIN_RADIANCE, rotation};
 use crate::error::{Error, ErrorKind};
 use crate::record::Filter;
 use alloc::vec;
@@ -187,14 +187,14 @@ impl Environment {
     }
 }
 
-/// Returns the depth of the smallest pyramid whose finest level has at least this many texels, at most [`MAX_DEPTH`].
+/// Returns the depth of the smallest pyramid whose finest level has at least this many texels, at most [`MAX_PYRAMID_DEPTH`].
 fn depth_for(texels: u64) -> u32 {
-    (0..MAX_DEPTH).find(|depth| 1 << (2 * depth) >= texels).unwrap_or(MAX_DEPTH)
+    (0..MAX_PYRAMID_DEPTH).find(|depth| 1 << (2 * depth) >= texels).unwrap_or(MAX_PYRAMID_DEPTH)
 }
 
 /// Returns the depth of a pyramid with at least `size` texels a side.
 fn checked_depth(size: usize) -> Result<u32, Error> {
-    let limit = 1 << MAX_DEPTH;
+    let limit = 1 << MAX_PYRAMID_DEPTH;
     if !(1..=limit).contains(&size) {
         let what = "environment: the resolution asked for";
         return Err(Error(ErrorKind::ImageSize { what, width: size, height: size, limit }));

@@ -43,6 +43,8 @@ pub(crate) struct FeatureTexel {
     pub(crate) sides: [[f32; 3]; 2],
 }
 
+const _: () = assert!(size_of::<FeatureTexel>() == 56);
+
 impl FeatureTexel {
     /// Builds a texel of the level with `2^level` texels a side. Its sum is left open.
     pub(super) fn new(level: u32, texel: u32, excess: f32) -> Self {

@@ -85,6 +85,8 @@ pub(crate) struct BrightFeature {
     pub(crate) level: u32,
 }
 
+const _: () = assert!(size_of::<BrightFeature>() == 32);
+
 /// An image split into bright features and a capped rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct BrightFeatures {

@@ -19,7 +19,7 @@ use core::f64::consts::{FRAC_PI_2, SQRT_2};
 const SLIVER: f64 = 1e-12;
 
 /// A texel or a part of one. A square that is cut twice along each of two lines has at most 8 vertices.
-type Polygon = geometry::Polygon<f64, 12>;
+type TexelPolygon = geometry::Polygon<f64, 12>;
 
 /// A latitude-longitude source, ready to be averaged over texels.
 pub(super) struct LatLong<'a> {
@@ -73,16 +73,16 @@ impl<'a> LatLong<'a> {
         let mut sums = Sums::default();
         let sliver = SLIVER * side * side;
         if k + l + 2 <= half {
-            let polygon = Polygon::new([upper(0, 0), upper(1, 0), upper(1, 1), upper(0, 1)]);
+            let polygon = TexelPolygon::new([upper(0, 0), upper(1, 0), upper(1, 1), upper(0, 1)]);
             self.add_octant(polygon, octant(false), sliver, &mut sums);
         } else if k + l >= half {
-            let polygon = Polygon::new([lower(0, 0), lower(1, 0), lower(1, 1), lower(0, 1)]);
+            let polygon = TexelPolygon::new([lower(0, 0), lower(1, 0), lower(1, 1), lower(0, 1)]);
             self.add_octant(polygon, octant(true), sliver, &mut sums);
         } else {
             // The equator is this texel's diagonal.
-            let polygon = Polygon::new([upper(0, 0), upper(1, 0), upper(0, 1)]);
+            let polygon = TexelPolygon::new([upper(0, 0), upper(1, 0), upper(0, 1)]);
             self.add_octant(polygon, octant(false), sliver, &mut sums);
-            let polygon = Polygon::new([lower(1, 1), lower(0, 1), lower(1, 0)]);
+            let polygon = TexelPolygon::new([lower(1, 1), lower(0, 1), lower(1, 0)]);
             self.add_octant(polygon, octant(true), sliver, &mut sums);
         }
         // By the summed area, not the texel's: a uniform region keeps its value to the last bit.
@@ -90,7 +90,7 @@ impl<'a> LatLong<'a> {
     }
 
     /// Cuts a polygon of one octant along the parallels.
-    fn add_octant(&self, polygon: Polygon, octant: Octant, sliver: f64, sums: &mut Sums) {
+    fn add_octant(&self, polygon: TexelPolygon, octant: Octant, sliver: f64, sums: &mut Sums) {
         let (low, high) = range(polygon.vertices().iter().map(|p| p[0]));
         let mut rest = polygon;
         let mut row = self.radii.partition_point(|&r| r <= low).min(self.radii.len() - 1);
@@ -105,7 +105,7 @@ impl<'a> LatLong<'a> {
     }
 
     /// Cuts a polygon of one row along the meridians.
-    fn add_row(&self, polygon: Polygon, row: usize, octant: Octant, sliver: f64, sums: &mut Sums) {
+    fn add_row(&self, polygon: TexelPolygon, row: usize, octant: Octant, sliver: f64, sums: &mut Sums) {
         if area(&polygon) <= sliver {
             return;
         }
@@ -140,7 +140,7 @@ impl<'a> LatLong<'a> {
 }
 
 /// Returns the area of a polygon in either sense of rotation.
-fn area(polygon: &Polygon) -> f64 {
+fn area(polygon: &TexelPolygon) -> f64 {
     0.5 * polygon.fan().map(|(_, double)| double).sum::<f64>().abs()
 }
 

@@ -49,4 +49,4 @@ pub(crate) const MIN_RADIANCE: f32 = 1e-30;
 ///
 /// Larger: indices of texels and the rounding of the map (2.5e-7) would no longer fit the texels, 1.2e-4 of the side.
 /// Smaller: large images lose detail.
-pub(crate) const MAX_DEPTH: u32 = 13;
+pub(crate) const MAX_PYRAMID_DEPTH: u32 = 13;

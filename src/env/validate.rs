@@ -4,7 +4,7 @@ use super::feature_texel::FeatureTexel;
 use super::features::{BrightFeature, MAX_FEATURES, finest};
 use super::pyramid::{children, level_start, parent_mean, parent_range};
 use super::view::{EnvironmentHeader, EnvironmentView};
-use super::{MAX_DEPTH, MAX_RADIANCE, MIN_RADIANCE, rotation};
+use super::{MAX_PYRAMID_DEPTH, MAX_RADIANCE, MIN_RADIANCE, rotation};
 use crate::buffers::{Section, Sections};
 use crate::error::{Error, ErrorKind};
 use alloc::vec::Vec;
@@ -42,8 +42,8 @@ impl<'a> EnvironmentView<'a> {
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let Self { header, means, ranges, filtered, features, feature_texels } = *self;
         let depth = header.depth;
-        if depth > MAX_DEPTH {
-            return Err(wrong("the environment's depth", 0, u64::from(depth), u64::from(MAX_DEPTH)));
+        if depth > MAX_PYRAMID_DEPTH {
+            return Err(wrong("the environment's depth", 0, u64::from(depth), u64::from(MAX_PYRAMID_DEPTH)));
         }
         let (inner, all) = (level_start(depth), level_start(depth + 1));
         for (what, found, expected) in [

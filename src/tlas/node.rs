@@ -123,7 +123,7 @@ impl<const N: usize> Node<N> {
     /// The same in units of [`NORMAL_STEPS`].
     #[inline(always)]
     pub(super) fn steps(normal: u32, axis: u32) -> f32 {
-        ((normal << (22 - 10 * axis)).cast_signed() >> 22) as f32
+        ((normal << (22 - 10 * axis)) as i32 >> 22) as f32
     }
 
     /// Energies that do not depend on the direction, and those of portals.

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use glam::Vec3;
+use exr::meta::attribute::Chromaticities;
+use glam::{DMat3, Vec3, dvec3};
 use image::{Rgb, RgbImage};
 
 use crate::Error;
@@ -11,7 +12,10 @@ use crate::film::Image;
 /// Brightness of the reference's mean in a picture, before the shoulder. *Format*: a matter of taste.
 const KEY: f32 = 0.35;
 
-/// Reads an `OpenEXR` file.
+/// Red, green, blue and white of linear sRGB, in CIE xy; *format*, from Rec. ITU-R BT.709.
+const SRGB: [[f64; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
+
+/// Reads an `OpenEXR` file. Colors of other primaries are converted to those of linear sRGB, without adaptation of the white.
 pub(crate) fn read_exr(path: &Path) -> Result<Image, Error> {
     let read = exr::prelude::read_first_rgba_layer_from_file(
         path,
@@ -20,12 +24,26 @@ pub(crate) fn read_exr(path: &Path) -> Result<Image, Error> {
             image.pixels[at.y() * image.width + at.x()] = Vec3::new(r, g, b);
         },
     );
-    let image =
-        read.map_err(|error| format!("cannot read {}: {error}", path.display()))?.layer_data.channel_data.pixels;
+    let read = read.map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let mut image = read.layer_data.channel_data.pixels;
+    if let Some(Chromaticities { red, green, blue, white }) = read.attributes.chromaticities {
+        let file = [red, green, blue, white].map(|place| [f64::from(place.x()), f64::from(place.y())]);
+        let to_srgb = to_xyz(SRGB).inverse() * to_xyz(file);
+        for pixel in &mut image.pixels {
+            *pixel = (to_srgb * pixel.as_dvec3()).as_vec3();
+        }
+    }
     match image.pixels.iter().position(|pixel| !pixel.is_finite()) {
         Some(i) => Err(format!("pixel {i} of {} is {}", path.display(), image.pixels[i]).into()),
         None => Ok(image),
     }
+}
+
+/// Returns the matrix from colors of these primaries to CIE XYZ; white has a luminance of 1.
+fn to_xyz(chromaticities: [[f64; 2]; 4]) -> DMat3 {
+    let [red, green, blue, white] = chromaticities.map(|[x, y]| dvec3(x / y, 1.0, (1.0 - x - y) / y));
+    let primaries = DMat3::from_cols(red, green, blue);
+    primaries * DMat3::from_diagonal(primaries.inverse() * white)
 }
 
 /// Writes an `OpenEXR` file.
@@ -51,4 +69,17 @@ fn display(radiance: Vec3) -> [u8; 3] {
         (255.0 * encoded + 0.5) as u8
     };
     radiance.to_array().map(|channel| encode(1.0 - (-channel).exp()))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::dvec3;
+
+    use super::{SRGB, to_xyz};
+
+    #[test]
+    fn luminance_of_srgb_has_the_usual_weights() {
+        let luminance = to_xyz(SRGB).row(1);
+        assert!(luminance.distance(dvec3(0.2126, 0.7152, 0.0722)) < 1e-4, "{luminance}");
+    }
 }

@@ -86,8 +86,8 @@ impl TriangleMesh {
         Earcut::new().earcut(points.iter().map(Vec2::to_array), &starts, &mut corners);
 
         let first = self.positions.len() as u32;
-        let triangles = corners.as_chunks::<3>().0.iter();
-        self.indices.extend(triangles.map(|&[a, b, c]| {
+        let triangles = corners.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]);
+        self.indices.extend(triangles.map(|[a, b, c]| {
             let [pa, pb, pc] = [a, b, c].map(|i| points[i as usize]);
             let faces_room = (pb - pa).perp_dot(pc - pa) > 0.0;
             (if faces_room { [a, b, c] } else { [a, c, b] }).map(|i| first + i)

@@ -47,10 +47,10 @@ fn numbering_of_four_is_corners_and_middle() {
 /// Down a random path of cells, a point strictly inside of the last cell is looked up along the same path.
 fn paths(seed: u64) {
     let mut rng = Pcg32::new(seed, 3);
-    let levels = MAX_DEPTH / LEVEL_HALVINGS;
+    let levels = MAX_HALVINGS / LEVEL_HALVINGS;
     for _ in 0..2000 {
         let mut cell = LatticeCell::whole();
-        let mut path = [0; MAX_DEPTH as usize];
+        let mut path = [0; MAX_HALVINGS as usize];
         for index in &mut path[..levels as usize] {
             *index = rng.below(ARITY as u32) as usize;
             cell = cell.child(*index);
@@ -93,7 +93,7 @@ fn everywhere() {
     }
     for point in points {
         let (mut local, mut cell) = (point, LatticeCell::whole());
-        for _ in 0..MAX_DEPTH / LEVEL_HALVINGS {
+        for _ in 0..MAX_HALVINGS / LEVEL_HALVINGS {
             let (index, next) = child(local, cell.size);
             cell = cell.child(index);
             local = next;

@@ -35,7 +35,7 @@ const LINE_AREA: f64 = 1e-9;
 
 /// A footprint, or the part of one in a square of texels. A triangle cut by four lines has at most seven vertices;
 /// rounding could add one at each cut.
-type Polygon = geometry::Polygon<f64, 12>;
+type FootprintPolygon = geometry::Polygon<f64, 12>;
 
 /// The average over a footprint in which lookups lie in `range`, from 0 to
 /// [`MAX_AVERAGE`](crate::blas::node::MAX_AVERAGE).
@@ -43,7 +43,7 @@ type Polygon = geometry::Polygon<f64, 12>;
 /// It is zero exactly where the whole touched range is black. Otherwise it is a normal number between the range's
 /// ends, and exact (up to rounding, and up to a floor of a millionth of the brightest texel) for footprints of up to
 /// about 48 texels.
-pub(crate) fn average(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint, range: TexelRange) -> f32 {
+pub(crate) fn average(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, range: TexelRange) -> f32 {
     if range.is_constant() {
         return storable(f64::from(range.max));
     }
@@ -53,13 +53,13 @@ pub(crate) fn average(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint,
     });
     let line = footprint.double_area() <= LINE_AREA * longest;
     let mean = if line {
-        looked_up(prepared, footprint)
+        looked_up(pyramid, footprint)
     } else if texels(footprint) > EXACT_TEXELS {
-        blocks(prepared, footprint)
+        blocks(pyramid, footprint)
     } else {
-        match prepared.texture().filtering() {
-            Filter::Nearest => nearest(prepared, footprint),
-            Filter::Bilinear => bilinear(prepared, footprint),
+        match pyramid.texture().filtering() {
+            Filter::Nearest => nearest(pyramid, footprint),
+            Filter::Bilinear => bilinear(pyramid, footprint),
         }
     };
     let (min, max) = (f64::from(range.min), f64::from(range.max));
@@ -74,8 +74,8 @@ fn texels(footprint: &TexelFootprint) -> f64 {
 }
 
 /// Splits the polygon by unit squares and visits each piece with its square's corner.
-fn squares(polygon: Polygon, mut each: impl FnMut([f64; 2], &Polygon)) {
-    let span = |polygon: &Polygon, k: usize| {
+fn squares(polygon: FootprintPolygon, mut each: impl FnMut([f64; 2], &FootprintPolygon)) {
+    let span = |polygon: &FootprintPolygon, k: usize| {
         let (lo, hi) = extent(polygon, k);
         // An empty polygon spans nothing.
         if lo <= hi { (floor64(lo) as i64, floor64(hi) as i64) } else { (0, -1) }
@@ -91,13 +91,13 @@ fn squares(polygon: Polygon, mut each: impl FnMut([f64; 2], &Polygon)) {
 }
 
 /// Ends of a polygon along an axis.
-fn extent(polygon: &Polygon, axis: usize) -> (f64, f64) {
+fn extent(polygon: &FootprintPolygon, axis: usize) -> (f64, f64) {
     let ends = (f64::INFINITY, f64::NEG_INFINITY);
     polygon.vertices().iter().fold(ends, |(lo, hi), v| (v[axis].min(lo), v[axis].max(hi)))
 }
 
 /// The part of a polygon between two parallels: `lo <= coordinate <= hi` along an axis.
-fn strip(polygon: &Polygon, axis: usize, lo: f64, hi: f64) -> Polygon {
+fn strip(polygon: &FootprintPolygon, axis: usize, lo: f64, hi: f64) -> FootprintPolygon {
     let (min, max) = extent(polygon, axis);
     let mut out = *polygon;
     if min < lo {
@@ -110,7 +110,7 @@ fn strip(polygon: &Polygon, axis: usize, lo: f64, hi: f64) -> Polygon {
 }
 
 /// Area, not negative.
-fn area(polygon: &Polygon) -> f64 {
+fn area(polygon: &FootprintPolygon) -> f64 {
     polygon.fan().map(|(_, double)| 0.5 * double.abs()).sum()
 }
 
@@ -118,7 +118,7 @@ fn area(polygon: &Polygon) -> f64 {
 /// a polygon inside of it.
 ///
 /// The weights are quadratic, so that the rule of the three edge midpoints is exact on each triangle of a fan.
-fn bilinear_weights(polygon: &Polygon, corner: [f64; 2]) -> [f64; 4] {
+fn bilinear_weights(polygon: &FootprintPolygon, corner: [f64; 2]) -> [f64; 4] {
     let mut weights = [0.0; 4];
     for ([a, b, c], double) in polygon.fan() {
         let area = 0.5 * double.abs();
@@ -137,10 +137,10 @@ fn bilinear_weights(polygon: &Polygon, corner: [f64; 2]) -> [f64; 4] {
 }
 
 /// Texels weighted by the area that the footprint covers of each.
-fn nearest(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
-    let texture = prepared.texture();
+fn nearest(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
+    let texture = pyramid.texture();
     let (mut sum, mut total) = (0.0, 0.0);
-    squares(Polygon::new(footprint.corners), |corner, piece| {
+    squares(FootprintPolygon::new(footprint.corners), |corner, piece| {
         let covered = area(piece);
         let [x, y] = core::array::from_fn(|k| footprint.origin[k] + corner[k] as i64);
         sum += covered * f64::from(texture.fetch(x, y));
@@ -150,12 +150,12 @@ fn nearest(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
 }
 
 /// The integral of the interpolated texture, one patch between four texel centers at a time.
-fn bilinear(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
-    let texture = prepared.texture();
+fn bilinear(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
+    let texture = pyramid.texture();
     let (mut sum, mut total) = (0.0, 0.0);
     // Patches have their corners at texel centers.
     let shifted = footprint.corners.map(|[x, y]| [x - 0.5, y - 0.5]);
-    squares(Polygon::new(shifted), |corner, piece| {
+    squares(FootprintPolygon::new(shifted), |corner, piece| {
         let weights = bilinear_weights(piece, corner);
         let [x, y]: [i64; 2] = core::array::from_fn(|k| footprint.origin[k] + corner[k] as i64);
         let texels = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
@@ -169,24 +169,24 @@ fn bilinear(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
 
 /// The mean of lookups at the centers of cells, in a level of the pyramid whose blocks are about as large as these
 /// cells. Ignores the half texel that bilinear lookup blurs a block's edge by.
-fn blocks(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
-    let texture = prepared.texture();
+fn blocks(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
+    let texture = pyramid.texture();
     let (size, wrap) = (texture.size(), texture.wrapping());
     let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
     let mut level = 0;
-    while level < prepared.top() && span > f64::from(IMAGE_SUBDIVISION << level) {
+    while level < pyramid.top() && span > f64::from(IMAGE_SUBDIVISION << level) {
         level += 1;
     }
     mean_of_centers(footprint, |[x, y]| {
         let texel = |at: f64, k: usize| wrap_index(wrap[k], footprint.origin[k] + floor64(at) as i64, size[k]);
-        f64::from(prepared.block(level, texel(x, 0) >> level, texel(y, 1) >> level).mean)
+        f64::from(pyramid.block(level, texel(x, 0) >> level, texel(y, 1) >> level).mean)
     })
 }
 
 /// The mean of lookups, for footprints without area: a point or a line.
-fn looked_up(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
+fn looked_up(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
     let [x0, y0] = footprint.origin.map(|origin| origin as f64);
-    mean_of_centers(footprint, |[x, y]| prepared.texture().value_at(x0 + x, y0 + y))
+    mean_of_centers(footprint, |[x, y]| pyramid.texture().value_at(x0 + x, y0 + y))
 }
 
 /// Mean over the centers of the cells of a regular subdivision.

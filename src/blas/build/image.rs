@@ -5,7 +5,7 @@ use core::convert::Infallible;
 
 use glam::Vec2;
 
-use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_DEPTH};
+use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
 use crate::blas::build::coverage::average;
 use crate::blas::build::footprint::{UvTriangle, check_uv};
 use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
@@ -84,57 +84,53 @@ const LEAVES_PER_COPY: f64 = 4.0;
 /// If a coordinate is not finite or beyond [`UV_LIMIT`](crate::blas::build::footprint::UV_LIMIT) (a caller that knows
 /// the mesh checks first, with [`check_uv`]; here the error says mesh 0), or if the pool has no more indices. The pool
 /// is then as it was.
-pub(crate) fn build(
-    prepared: &mut TexturePyramid<'_>,
-    uv: [Vec2; 3],
-    pool: &mut Vec<CellBlock>,
-) -> Result<Root, Error> {
+pub(crate) fn build(pyramid: &mut TexturePyramid<'_>, uv: [Vec2; 3], pool: &mut Vec<CellBlock>) -> Result<Root, Error> {
     for (vertex, uv) in uv.into_iter().enumerate() {
         check_uv(0, vertex, uv)?;
     }
-    let whole = prepared.whole();
+    let whole = pyramid.whole();
     if whole.min == whole.max {
         return Ok(Root::constant(storable(f64::from(whole.max))));
     }
-    let chart = UvTriangle::new(prepared.texture(), uv);
-    let footprint = chart.footprint(LatticeCell::whole());
-    let range = touched::range(prepared, &footprint, true);
-    let memory = TreeBudget::new(&chart, prepared);
-    let nodes = memory.nodes(&chart, prepared.texture());
+    let uv_triangle = UvTriangle::new(pyramid.texture(), uv);
+    let footprint = uv_triangle.footprint(LatticeCell::whole());
+    let range = touched::range(pyramid, &footprint, true);
+    let memory = TreeBudget::new(&uv_triangle, pyramid);
+    let nodes = memory.nodes(&uv_triangle, pyramid.texture());
     if range.is_constant() || nodes == 0 {
-        return Ok(Root::constant(average(prepared, &footprint, range)));
+        return Ok(Root::constant(average(pyramid, &footprint, range)));
     }
-    let fine = levels(&chart);
+    let fine = levels(&uv_triangle);
     let [sharp, blurred] = EXTRA_HALVINGS;
-    let extra = if prepared.texture().filtering() == Filter::Nearest { sharp } else { blurred };
-    let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_DEPTH / LEVEL_HALVINGS);
+    let extra = if pyramid.texture().filtering() == Filter::Nearest { sharp } else { blurred };
+    let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_HALVINGS / LEVEL_HALVINGS);
     debug_assert!(LATTICE >> (deepest * LEVEL_HALVINGS) >= 16);
-    let source = ImageOnTriangle { prepared, chart: &chart };
+    let source = ImageOnTriangle { pyramid, uv_triangle: &uv_triangle };
     let Ok(tree) = grow(&source, range, &GrowthLimits { nodes, fine, deepest, variance: IMAGE_VARIANCE });
     let (root, bytes) = tree.store(pool)?;
-    prepared.extra -= (bytes - memory.own).max(0.0).min(prepared.extra);
+    pyramid.extra -= (bytes - memory.own).max(0.0).min(pyramid.extra);
     Ok(root)
 }
 
 /// An image on a triangle.
 struct ImageOnTriangle<'a> {
-    prepared: &'a TexturePyramid<'a>,
-    chart: &'a UvTriangle,
+    pyramid: &'a TexturePyramid<'a>,
+    uv_triangle: &'a UvTriangle,
 }
 
 impl WeightSource for ImageOnTriangle<'_> {
     type Fault = Infallible;
 
     fn range(&self, cell: LatticeCell, exact: bool) -> Result<TexelRange, Infallible> {
-        Ok(touched::range(self.prepared, &self.chart.footprint(cell), exact))
+        Ok(touched::range(self.pyramid, &self.uv_triangle.footprint(cell), exact))
     }
 
     fn average(&self, cell: LatticeCell, range: TexelRange) -> Result<f32, Infallible> {
-        Ok(average(self.prepared, &self.chart.footprint(cell), range))
+        Ok(average(self.pyramid, &self.uv_triangle.footprint(cell), range))
     }
 
     fn spread(&self) -> f64 {
-        match self.prepared.texture().filtering() {
+        match self.pyramid.texture().filtering() {
             Filter::Nearest => 1.0,
             Filter::Bilinear => RAMP,
         }
@@ -142,12 +138,12 @@ impl WeightSource for ImageOnTriangle<'_> {
 }
 
 /// How many levels it takes until cells are fine.
-fn levels(chart: &UvTriangle) -> u32 {
+fn levels(uv_triangle: &UvTriangle) -> u32 {
     let halvings = LEVEL_HALVINGS;
-    let (double_area, longest) = chart.extent();
+    let (double_area, longest) = uv_triangle.extent();
     let mut levels = 0;
     let mut scale = 1.0;
-    while (levels + 1) * halvings <= MAX_DEPTH
+    while (levels + 1) * halvings <= MAX_HALVINGS
         && (0.5 * double_area * scale > FINE_AREA || longest * scale > FINE_LENGTH * FINE_LENGTH)
     {
         levels += 1;
@@ -165,26 +161,26 @@ struct TreeBudget {
 }
 
 impl TreeBudget {
-    fn new(chart: &UvTriangle, prepared: &TexturePyramid<'_>) -> Self {
-        let [w, h] = chart.box_size().map(|n| n + 2.0);
-        let size = prepared.texture().size().map(f64::from);
-        let covered = chart.covered();
+    fn new(uv_triangle: &UvTriangle, pyramid: &TexturePyramid<'_>) -> Self {
+        let [w, h] = uv_triangle.box_size().map(|n| n + 2.0);
+        let size = pyramid.texture().size().map(f64::from);
+        let covered = uv_triangle.covered();
         let seen = w.min(size[0]) * h.min(size[1]);
         let own = if covered <= seen { covered } else { covered.min((0.25 * seen).max(TEXELS_OF_COPIES)) };
         let own = (BYTES_PER_TEXEL * own).min(IMAGE_TREE_BYTES);
         let share = (covered / (size[0] * size[1])).min(1.0);
-        Self { own, most: own.max((BYTES_PER_IMAGE * share).min(own + prepared.extra)) }
+        Self { own, most: own.max((BYTES_PER_IMAGE * share).min(own + pyramid.extra)) }
     }
 
     /// The number of nodes that there is memory for, 0 if dividing would not help.
-    fn nodes(&self, chart: &UvTriangle, texture: &Texture<'_>) -> usize {
-        if chart.covered() < LEAST_TEXELS {
+    fn nodes(&self, uv_triangle: &UvTriangle, texture: &Texture<'_>) -> usize {
+        if uv_triangle.covered() < LEAST_TEXELS {
             return 0;
         }
         let blocks = ((self.most / size_of::<CellBlock>() as f64) as usize).max(1);
         let nodes = blocks * BLOCK_CELLS / ARITY;
         let [w, h] = texture.size().map(f64::from);
-        let copies = 0.5 * chart.extent().0 / (w * h);
+        let copies = 0.5 * uv_triangle.extent().0 / (w * h);
         let leaves = ((ARITY - 1) * nodes) as f64;
         let repeats = !texture.wrapping().contains(&Wrap::Clamp);
         if repeats && leaves < LEAVES_PER_COPY * copies { 0 } else { nodes }

@@ -5,7 +5,7 @@ use core::fmt;
 
 use glam::{DVec2, Vec2};
 
-use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_DEPTH};
+use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
 use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
 use crate::blas::build::touched::TexelRange;
 use crate::blas::node::{BLOCK_CELLS, CellBlock, Root, storable};
@@ -143,7 +143,7 @@ pub(crate) fn build_procedural(
     }
     let most = (FUNCTION_OWN_BYTES + function.extra).min(FUNCTION_TREE_BYTES);
     let blocks = ((most / size_of::<CellBlock>() as f64) as usize).max(1);
-    let deepest = MAX_DEPTH / LEVEL_HALVINGS;
+    let deepest = MAX_HALVINGS / LEVEL_HALVINGS;
     let limits = GrowthLimits { nodes: blocks * BLOCK_CELLS / ARITY, fine: 0, deepest, variance: FUNCTION_VARIANCE };
     let tree = grow(&source, range, &limits).map_err(fail)?;
     let (root, bytes) = tree.store(pool)?;

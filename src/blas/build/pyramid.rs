@@ -38,21 +38,21 @@ struct PyramidLevel {
 impl<'a> TexturePyramid<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
-        let mut prepared = Self { texture, levels: Vec::new(), extra: BYTES_PER_IMAGE };
+        let mut pyramid = Self { texture, levels: Vec::new(), extra: BYTES_PER_IMAGE };
         let mut size = texture.size();
         while size != [1, 1] {
-            let below = prepared.levels.len() as u32;
+            let below = pyramid.levels.len() as u32;
             let [w, h] = size.map(|n| n.div_ceil(2));
             let mut blocks = Vec::with_capacity(w as usize * h as usize);
             for y in 0..h {
                 for x in 0..w {
-                    blocks.push(prepared.merge(below, x, y, size));
+                    blocks.push(pyramid.merge(below, x, y, size));
                 }
             }
             size = [w, h];
-            prepared.levels.push(PyramidLevel { size, blocks });
+            pyramid.levels.push(PyramidLevel { size, blocks });
         }
-        prepared
+        pyramid
     }
 
     /// The block above up to four blocks of the level `below`, which has `size` blocks.
@@ -111,8 +111,8 @@ mod tests {
         let mut rng = Pcg32::new(1, 1);
         for (w, h) in [(1, 1), (1, 37), (5, 3), (64, 64), (33, 7)] {
             let texels: Vec<f32> = (0..w * h).map(|_| rng.next_f32()).collect();
-            let prepared = TexturePyramid::new(Texture::new(w, h, &texels).unwrap());
-            let whole = prepared.whole();
+            let pyramid = TexturePyramid::new(Texture::new(w, h, &texels).unwrap());
+            let whole = pyramid.whole();
             let mean = texels.iter().map(|&t| f64::from(t)).sum::<f64>() / texels.len() as f64;
             assert_eq!(whole.min, texels.iter().copied().fold(f32::INFINITY, f32::min));
             assert_eq!(whole.max, texels.iter().copied().fold(0.0, f32::max));

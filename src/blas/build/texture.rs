@@ -6,7 +6,7 @@ use crate::record::{Filter, Wrap};
 
 /// The longest side of an image, in texels. *Proved*: with [`UV_LIMIT`](super::footprint::UV_LIMIT), coordinates in
 /// texels stay below 2^32, which leaves a double 20 bits within a texel.
-pub(crate) const MAX_SIDE: usize = 1 << 15;
+pub(crate) const MAX_TEXTURE_SIDE: usize = 1 << 15;
 
 /// A scalar weight over texture coordinates: luminance of an emission, transmittance of a portal.
 ///
@@ -35,8 +35,8 @@ impl<'a> Texture<'a> {
     /// negative.
     pub fn new(width: usize, height: usize, texels: &'a [f32]) -> Result<Self, Error> {
         let what = "texture";
-        if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-            return Err(Error(ErrorKind::ImageSize { what, width, height, limit: MAX_SIDE }));
+        if !(1..=MAX_TEXTURE_SIDE).contains(&width) || !(1..=MAX_TEXTURE_SIDE).contains(&height) {
+            return Err(Error(ErrorKind::ImageSize { what, width, height, limit: MAX_TEXTURE_SIDE }));
         }
         if texels.len() != width * height {
             return Err(Error(ErrorKind::TexelCount { what, width, height, found: texels.len() }));

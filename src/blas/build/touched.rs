@@ -41,8 +41,8 @@ const FOOTPRINT_BLOCKS: u32 = 8;
 /// enough that a range which is not constant is found not to be.
 ///
 /// Where a footprint spans many copies of the image along an axis, all of the image along that axis counts.
-pub(crate) fn range(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint, exact: bool) -> TexelRange {
-    let texture = prepared.texture();
+pub(crate) fn range(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, exact: bool) -> TexelRange {
+    let texture = pyramid.texture();
     let support = support(texture.filtering());
     let reach = footprint.slack.map(|slack| slack + support);
     let along = |k: usize| {
@@ -53,9 +53,9 @@ pub(crate) fn range(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint, e
     let (columns, rows) = (along(0), along(1));
     let span = (footprint.hi[0] - footprint.lo[0]).max(footprint.hi[1] - footprint.lo[1]);
     let finest =
-        (0..prepared.top()).take_while(|level| span > f64::from((2 * FOOTPRINT_BLOCKS) << level)).count() as u32;
+        (0..pyramid.top()).take_while(|level| span > f64::from((2 * FOOTPRINT_BLOCKS) << level)).count() as u32;
     let range = TexelRange { min: f32::INFINITY, max: 0.0 };
-    let mut search = RangeSearch { prepared, footprint, reach, exact, finest, range };
+    let mut search = RangeSearch { pyramid, footprint, reach, exact, finest, range };
     for row in &rows {
         for column in &columns {
             search.stretch(column, row);
@@ -65,13 +65,13 @@ pub(crate) fn range(prepared: &TexturePyramid<'_>, footprint: &TexelFootprint, e
         search.range
     } else {
         // A footprint always lies on the plane. If rounding lost it, all of the image may be under it.
-        let whole = prepared.whole();
+        let whole = pyramid.whole();
         TexelRange { min: whole.min, max: whole.max }
     }
 }
 
 struct RangeSearch<'a> {
-    prepared: &'a TexturePyramid<'a>,
+    pyramid: &'a TexturePyramid<'a>,
     footprint: &'a TexelFootprint,
     reach: [f64; 2],
     exact: bool,
@@ -95,7 +95,7 @@ impl RangeSearch<'_> {
     }
 
     fn visit(&mut self, column: &TexelRun, row: &TexelRun, level: u32, x: u32, y: u32) {
-        let block = self.prepared.block(level, x, y);
+        let block = self.pyramid.block(level, x, y);
         // Nothing new in there; this is what makes the search short.
         if block.min >= self.range.min && block.max <= self.range.max {
             return;

@@ -3,12 +3,12 @@
 
 use super::guide::Guide;
 use super::target::{CellTarget, TextureChildren};
-use crate::blas::barycentric::{LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_DEPTH};
+use crate::blas::barycentric::{LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
 use crate::blas::node::{self, CellBlock, LEAF, Root};
 use crate::warp::{keep_possible, sum};
 
 /// The smallest cell that can be divided, in lattice units.
-const SMALLEST_DIVISIBLE: u32 = LATTICE >> (MAX_DEPTH - LEVEL_HALVINGS);
+const SMALLEST_DIVISIBLE: u32 = LATTICE >> (MAX_HALVINGS - LEVEL_HALVINGS);
 
 /// Descends from the whole triangle to a cell over which the density is constant. Returns it with its probability;
 /// `None` where nothing can arrive from the cell that the guide leads to.

@@ -4,7 +4,7 @@ use super::*;
 use crate::env::EnvironmentView;
 use crate::testing::{chi_square, chi_square_limit};
 
-const ALMOST_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 fn assert_agrees(view: &EnvironmentView<'_>, u: [f32; 2]) {
     let Some(sample) = view.sample(u) else {
@@ -34,7 +34,7 @@ fn a_sample_s_density_is_that_of_its_direction() {
         for _ in 0..200_000 {
             assert_agrees(&view, [pcg.next_f32(), pcg.next_f32()]);
         }
-        let edges = [0.0, ALMOST_ONE, 0.5, 0.25, f32::from_bits(0.5_f32.to_bits() - 1), 1e-45];
+        let edges = [0.0, BELOW_ONE, 0.5, 0.25, f32::from_bits(0.5_f32.to_bits() - 1), 1e-45];
         for u in edges {
             for v in edges {
                 assert_agrees(&view, [u, v]);

@@ -64,7 +64,7 @@ impl<const N: usize> Node<N> {
         let length = moments.normal.length();
         let direction = if length > 1e-3 { moments.normal / length } else { bounds.normals.axis };
         let code = |value: f32| (value * NORMAL_SCALE + 0.5f32.copysign(value)) as i32;
-        let [x, y, z] = direction.to_array().map(|value| code(value).cast_unsigned() & 0x3ff);
+        let [x, y, z] = direction.to_array().map(|value| code(value) as u32 & 0x3ff);
         let normal = x | y << 10 | z << 20;
         let side = if bounds.two_sided { TWO_SIDED } else { 0 };
         self.normals[lane] = normal | side;

@@ -17,11 +17,7 @@ pub(super) fn captured(data: &Data, name: &str) -> Result<Sky, Error> {
 
 /// Reads a captured sky, turned about z so that its brightest texel has x = 0, y > 0.
 pub(super) fn facing_window(data: &Data, name: &str) -> Result<Sky, Error> {
-    let mut image = data.image(&format!("environments/{name}.exr"))?;
-    if std::env::var_os("MIRROR").is_some() {
-        let width = image.width;
-        image.pixels.chunks_mut(width).for_each(|row| row.reverse());
-    }
+    let image = data.image(&format!("environments/{name}.exr"))?;
     let luminance = |i: &usize| image.pixels[*i].dot(LUMINANCE);
     let brightest = (0..image.pixels.len()).max_by(|i, j| luminance(i).total_cmp(&luminance(j))).unwrap_or(0);
     let texel = [brightest % image.width, brightest / image.width];

@@ -11,10 +11,10 @@ use crate::testing::Pcg32;
 
 const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 
-fn average_of(prepared: &TexturePyramid<'_>, uv: [Vec2; 3]) -> (f64, TexelRange) {
-    let footprint = UvTriangle::new(prepared.texture(), uv).footprint(LatticeCell::whole());
-    let range = range(prepared, &footprint, true);
-    (f64::from(average(prepared, &footprint, range)), range)
+fn average_of(pyramid: &TexturePyramid<'_>, uv: [Vec2; 3]) -> (f64, TexelRange) {
+    let footprint = UvTriangle::new(pyramid.texture(), uv).footprint(LatticeCell::whole());
+    let range = range(pyramid, &footprint, true);
+    (f64::from(average(pyramid, &footprint, range)), range)
 }
 
 /// Lookups at the centers of `n²` cells: mean, least and greatest.
@@ -45,8 +45,8 @@ fn random_uv(rng: &mut Pcg32, scale: f32) -> [Vec2; 3] {
 }
 
 fn compare(texture: Texture<'_>, uv: [Vec2; 3], tolerance: f64) {
-    let prepared = TexturePyramid::new(texture);
-    let (found, range) = average_of(&prepared, uv);
+    let pyramid = TexturePyramid::new(texture);
+    let (found, range) = average_of(&pyramid, uv);
     let (mean, min, max) = brute_force(&texture, uv, 160);
     let spread = f64::from(range.max - range.min);
     assert!((found - mean).abs() <= tolerance * spread + 1e-6 * mean, "{found} is not {mean}: {uv:?} {texture:?}");
@@ -81,12 +81,12 @@ fn averages_are_those_of_many_lookups() {
 fn a_small_cell_is_integrated_to_rounding() {
     // Between the four texel centers the image is x + y, so that its mean over the lower half is 2/3.
     let texels = [0.0, 1.0, 1.0, 2.0];
-    let prepared = TexturePyramid::new(Texture::new(2, 2, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
+    let pyramid = TexturePyramid::new(Texture::new(2, 2, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
     let uv = [Vec2::new(0.25, 0.25), Vec2::new(0.75, 0.25), Vec2::new(0.25, 0.75)];
-    assert!((average_of(&prepared, uv).0 - 2.0 / 3.0).abs() < 1e-7);
+    assert!((average_of(&pyramid, uv).0 - 2.0 / 3.0).abs() < 1e-7);
     // Nearest: a quarter of a texel holds 0, two eighths hold 1.
-    let prepared = TexturePyramid::new(prepared.texture().filter(Filter::Nearest));
-    assert!((average_of(&prepared, uv).0 - 0.5).abs() < 1e-7);
+    let pyramid = TexturePyramid::new(pyramid.texture().filter(Filter::Nearest));
+    assert!((average_of(&pyramid, uv).0 - 0.5).abs() < 1e-7);
 }
 
 /// Larger footprints go through the pyramid.
@@ -108,9 +108,9 @@ fn a_bright_texel_far_away_costs_no_precision() {
     let mut texels = [1e-3f32; 64 * 64];
     texels[63] = f32::MAX;
     for at in [16.0, 32.0] {
-        let prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
+        let pyramid = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
         let uv = [Vec2::new(0.0, 0.9), Vec2::new(at / 64.0, 0.9), Vec2::new(0.0, 0.2)];
-        assert!((average_of(&prepared, uv).0 - 1e-3).abs() < 1e-9);
+        assert!((average_of(&pyramid, uv).0 - 1e-3).abs() < 1e-9);
     }
 }
 

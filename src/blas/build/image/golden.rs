@@ -15,9 +15,9 @@ fn quad() -> [[Vec2; 3]; 2] {
 #[test]
 fn golden() {
     let texels = spots(64);
-    let mut prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
+    let mut pyramid = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
     let mut pool = Vec::<CellBlock>::new();
-    let roots = quad().map(|uv| build(&mut prepared, uv, &mut pool).unwrap());
+    let roots = quad().map(|uv| build(&mut pyramid, uv, &mut pool).unwrap());
     // FNV-1a.
     let hash = |bytes: &[u8]| {
         bytes.iter().fold(0xcbf2_9ce4_8422_2325u64, |h, &b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3))

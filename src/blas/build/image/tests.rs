@@ -48,9 +48,9 @@ fn random_barycentrics(rng: &mut Pcg32) -> [f32; 2] {
 
 /// Everything that a tree promises. Returns the number of bytes.
 fn check(texture: Texture<'_>, uv: [Vec2; 3], points: u32) -> usize {
-    let mut prepared = TexturePyramid::new(texture);
+    let mut pyramid = TexturePyramid::new(texture);
     let mut pool = alloc::vec![bytemuck::Zeroable::zeroed(); 4];
-    let root = build(&mut prepared, uv, &mut pool).unwrap();
+    let root = build(&mut pyramid, uv, &mut pool).unwrap();
     validate(&pool).unwrap();
     validate_roots(&[root], &pool).unwrap();
     let mut rng = Pcg32::new(11, 4);
@@ -96,10 +96,10 @@ fn averages_at_the_root_are_those_of_the_image() {
     let texels: Vec<f32> = (0..64 * 64).map(|_| rng.next_f32()).collect();
     let mean = texels.iter().map(|&t| f64::from(t)).sum::<f64>() / texels.len() as f64;
     for filter in FILTERS {
-        let mut prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().filter(filter));
+        let mut pyramid = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().filter(filter));
         let mut pool = Vec::new();
-        let lower = build(&mut prepared, LOWER, &mut pool).unwrap();
-        let upper = build(&mut prepared, UPPER, &mut pool).unwrap();
+        let lower = build(&mut pyramid, LOWER, &mut pool).unwrap();
+        let upper = build(&mut pyramid, UPPER, &mut pool).unwrap();
         // Repeat: the filter loses nothing.
         let found = 0.5 * (f64::from(lower.average) + f64::from(upper.average));
         assert!((found - mean).abs() < 1e-5, "{found} {mean}");
@@ -111,9 +111,9 @@ fn black_stays_black() {
     // The left half. Repeated, the image would be white just left of it, where a host may look by rounding.
     let texels: Vec<f32> = (0..32 * 32).map(|i| if i % 32 < 16 { 0.0 } else { 1.0 }).collect();
     let texture = Texture::new(32, 32, &texels).unwrap().filter(Filter::Nearest).wrap(Wrap::Clamp, Wrap::Clamp);
-    let mut prepared = TexturePyramid::new(texture);
+    let mut pyramid = TexturePyramid::new(texture);
     let mut pool = Vec::new();
-    let root = build(&mut prepared, LOWER, &mut pool).unwrap();
+    let root = build(&mut pyramid, LOWER, &mut pool).unwrap();
     let mut rng = Pcg32::new(1, 9);
     for _ in 0..10_000 {
         let b = random_barycentrics(&mut rng);
@@ -125,7 +125,7 @@ fn black_stays_black() {
             assert_eq!(last, 1.0);
         }
     }
-    let black = build(&mut prepared, LOWER.map(|p| p * 0.49), &mut pool).unwrap();
+    let black = build(&mut pyramid, LOWER.map(|p| p * 0.49), &mut pool).unwrap();
     assert_eq!(black, Root::constant(0.0));
 }
 
@@ -142,9 +142,9 @@ fn levels_agree() {
     let mut rng = Pcg32::new(23, 4);
     for filter in FILTERS {
         let texels: Vec<f32> = (0..40 * 24).map(|_| rng.next_f32()).collect();
-        let mut prepared = TexturePyramid::new(Texture::new(40, 24, &texels).unwrap().filter(filter));
+        let mut pyramid = TexturePyramid::new(Texture::new(40, 24, &texels).unwrap().filter(filter));
         let mut pool = Vec::new();
-        build(&mut prepared, random_uv(&mut rng, 1.0), &mut pool).unwrap();
+        build(&mut pyramid, random_uv(&mut rng, 1.0), &mut pool).unwrap();
         let mut divided = 0;
         for node in 0..end(&pool, 0) as u32 {
             for (cell, average) in averages(&pool, node).into_iter().enumerate() {
@@ -176,9 +176,9 @@ fn extreme_coordinates() {
         }
     }
     for bad in [f32::NAN, f32::INFINITY, 1.1e5] {
-        let mut prepared = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap());
+        let mut pyramid = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap());
         let uv = [Vec2::ZERO, Vec2::new(0.0, bad), Vec2::ONE];
-        let error = build(&mut prepared, uv, &mut Vec::new()).unwrap_err();
+        let error = build(&mut pyramid, uv, &mut Vec::new()).unwrap_err();
         assert!(matches!(error.0, ErrorKind::TextureCoordinate { vertex: 1, .. }), "{error}");
     }
 }
@@ -227,10 +227,10 @@ fn memory_of_noise() {
 fn edges_between_large_texels_are_followed() {
     let texels: Vec<f32> = (0..8 * 8).map(|i| if i % 8 < 4 { 0.0 } else { 1.0 }).collect();
     let texture = Texture::new(8, 8, &texels).unwrap().filter(Filter::Nearest).wrap(Wrap::Clamp, Wrap::Clamp);
-    let mut prepared = TexturePyramid::new(texture);
+    let mut pyramid = TexturePyramid::new(texture);
     let mut pool = Vec::new();
     // The edge at 0.5 is none of cells here.
-    let root = build(&mut prepared, LOWER.map(|p| p * 0.7), &mut pool).unwrap();
+    let root = build(&mut pyramid, LOWER.map(|p| p * 0.7), &mut pool).unwrap();
     let mut rng = Pcg32::new(27, 4);
     let (mut lit, mut dark) = (0.0, 0.0);
     for _ in 0..100_000 {
