@@ -17,9 +17,8 @@ mod walk;
 pub(crate) use barycentric::{ARITY, Lattice, LatticeCell};
 pub use build::{Procedural, Texture};
 pub(crate) use build::{RegisteredFunction, TexturePyramid, build, build_procedural, check_uv};
-pub(crate) use node::{CellBlock, LEAF, MAX_AVERAGE, Root, averages, below, holds, mean, storable};
+pub(crate) use node::{CellNode, LEAF, MAX_AVERAGE, Root, averages, below, holds, mean, storable};
 pub(crate) use validate::{validate, validate_roots};
 pub(crate) use walk::{
-    CellTarget, CellWeight, CellWeights, Draw, Follow, Guide, TextureChildren, at_corners, centers, child_corners,
-    descend, descend_below,
+    CHILD_CENTERS, CellTarget, Draw, Follow, Guide, child_corners, child_values, descend, descend_below,
 };

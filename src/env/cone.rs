@@ -29,7 +29,7 @@ pub(super) const DEFENSIVE_SHARE: f32 = 0.02;
 /// twentieth.
 ///
 /// Larger: the descent divides more cells, at the cost of time. Smaller: less of the contrast is followed.
-const CONSTANT_RATIO: f32 = 0.6;
+pub(super) const CONSTANT_RATIO: f32 = 0.6;
 
 /// Slack of the box for rounding, in units of the square. *Proved*: covers the errors of the map (2.5e-7 at worst), of
 /// the rotation and of the direction.
@@ -134,8 +134,28 @@ impl EnvironmentView<'_> {
         RadianceBounds { mean: (sum / count).clamp(min, max), min, max }
     }
 
+    /// Returns the least and the largest radiance of the texels, 2x2 at most, that a box around a point touches.
+    #[inline(always)]
+    pub(super) fn range_of_box(&self, [x, y]: [f32; 2], half_side: f32) -> [f32; 2] {
+        let depth = self.depth_of_side(2.0 * half_side);
+        if depth == 0 {
+            return self.ranges[0];
+        }
+        let size = 1_i32 << depth;
+        let scale = size as f32;
+        let texel = |coordinate: f32| ((coordinate + 1.0) * scale) as i32 - size;
+        let [x0, x1, y0, y1] = [x - half_side, x + half_side, y - half_side, y + half_side].map(texel);
+        let mut range = [f32::INFINITY, 0.0_f32];
+        for (i, j) in [(x0, y0), (x1, y0), (x0, y1), (x1, y1)] {
+            let (i, j) = wrap_texel_log2(i, j, depth);
+            let [low, high] = self.range_at(depth, i, j);
+            range = [range[0].min(low), range[1].max(high)];
+        }
+        range
+    }
+
     /// Depth of the finest level whose texels are at least as wide as `side`, so that it touches 2x2 at most.
-    #[inline]
+    #[inline(always)]
     fn depth_of_side(&self, side: f32) -> u32 {
         // A little more than `side`: where both are equal, rounding could make it three texels.
         floor_log2(1.0 / (SIDE_SLACK * side)).clamp(0, self.header.depth as i32) as u32

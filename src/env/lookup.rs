@@ -9,6 +9,7 @@
 //! ([`VectorLookup::nearest`], [`VectorLookup::covering`]), and leaves it to [`VectorLookup::relative_radiances`] to fetch
 //! them after the loop.
 
+use super::cone::CONSTANT_RATIO;
 use super::view::EnvironmentView;
 use crate::math::{at_least, at_most, only_if, sqrt};
 use crate::warp::equal_area::{SPHERE, STRETCH};
@@ -76,6 +77,13 @@ impl<'a> EnvironmentView<'a> {
             inverse_mean: 1.0 / mean,
             needs_covering: least == 0.0 || largest > GREAT_CONTRAST * mean,
         }
+    }
+
+    /// Whether the radiance is about constant in the texels that a box around a point of the square touches.
+    #[inline(always)]
+    pub(crate) fn is_about_constant(&self, [u, v]: [f32; 2], half_side: f32) -> bool {
+        let [min, max] = self.range_of_box([u, v], half_side);
+        min >= CONSTANT_RATIO * max
     }
 }
 

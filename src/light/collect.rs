@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
 use super::{Energies, Illumination, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
-use crate::blas::{self, CellBlock, Procedural, RegisteredFunction, Root, Texture, TexturePyramid};
+use crate::blas::{self, CellNode, Procedural, RegisteredFunction, Root, Texture, TexturePyramid};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
 use crate::record::{MeshId, TextureId};
@@ -27,7 +27,7 @@ pub(crate) struct LightCollection<'a> {
     indices: Vec<u32>,
     /// Where each mesh starts in `indices`, and the end.
     meshes: Vec<u32>,
-    cells: Vec<CellBlock>,
+    cells: Vec<CellNode>,
     /// Trees over textures by texture and the bits of the three uvs.
     shared: BTreeMap<(u32, [u32; 6]), Root>,
 }

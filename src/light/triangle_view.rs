@@ -4,12 +4,14 @@ use core::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
 
+use super::cell_kernel::CellDescent;
 use super::{Illumination, LightKind, LightTriangle, LightViewKind};
-use crate::blas::{self, CellBlock, CellTarget, Draw, Follow, Lattice, LatticeCell, Root};
-use crate::env::EnvironmentView;
+use crate::blas::{CellNode, Draw, Follow, Guide, Lattice, LatticeCell, Root};
+use crate::env::{DirectionCone, EnvironmentView};
 use crate::geometry;
 use crate::math;
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
+use crate::simd::InstructionSet;
 use crate::warp::Variate;
 
 /// Largest coordinate of a shading point that anything arrives at.
@@ -52,7 +54,7 @@ pub(crate) struct TriangleView<'a> {
     /// The tree over the texture.
     pub(crate) root: Root,
     /// Nodes of the trees over textures.
-    pub(crate) cells: &'a [CellBlock],
+    pub(crate) cells: &'a [CellNode],
 }
 
 impl<'a> TriangleView<'a> {
@@ -62,7 +64,7 @@ impl<'a> TriangleView<'a> {
         light: &LightTriangle,
         x: &ShadingPoint,
         illumination: Illumination,
-        cells: &'a [CellBlock],
+        cells: &'a [CellNode],
         environment: Option<&'a EnvironmentView<'a>>,
     ) -> Option<Self> {
         // NaN fails.
@@ -114,6 +116,12 @@ impl<'a> TriangleView<'a> {
         geometry::intersect(self.exact_vertices, direction).map(Lattice::from_barycentrics)
     }
 
+    /// Descends to a cell of about constant density. Returns it with its probability.
+    #[inline(always)]
+    fn descend(&self, guide: &mut impl Guide) -> Option<(LatticeCell, f64)> {
+        InstructionSet::best().run(CellDescent { view: self, guide })
+    }
+
     /// Returns the density per solid angle of a point of a cell that was chosen with this probability, `p_A d² / cos θl`.
     /// `None` where it is not a positive number.
     #[inline]
@@ -128,14 +136,14 @@ impl LightViewKind for TriangleView<'_> {
     #[inline(always)]
     fn sample(&self, u: [Variate; 2]) -> Option<(Lattice, f64)> {
         let mut draw = Draw::new(u);
-        let (cell, cell_pmf) = blas::descend(self.cells, self.root, self, &mut draw)?;
+        let (cell, cell_pmf) = self.descend(&mut draw)?;
         let point = draw.point(cell);
         Some((point, self.pdf_in(cell, cell_pmf, point)?))
     }
 
     #[inline]
     fn pdf(&self, point: Lattice) -> Option<f64> {
-        let (cell, cell_pmf) = blas::descend(self.cells, self.root, self, &mut Follow::new(point))?;
+        let (cell, cell_pmf) = self.descend(&mut Follow::new(point))?;
         self.pdf_in(cell, cell_pmf, point)
     }
 
@@ -159,7 +167,18 @@ impl LightViewKind for TriangleView<'_> {
     }
 
     fn irradiance(&self, scale: f32) -> f32 {
-        let weight = self.weigh(LatticeCell::whole(), &mut self.whole()).weight;
-        PI * self.root.average * scale * weight
+        let radiance = self.environment.map_or(1.0, |environment| {
+            let [a, b, c] = self.vertices;
+            let center = (a + b + c) * (1.0 / 3.0);
+            let least = (self.height * self.height).max(f32::MIN_POSITIVE);
+            let inverse = 1.0 / math::sqrt(center.length_squared().max(least));
+            let cone = DirectionCone {
+                direction: center * inverse,
+                sin_radius: math::sqrt(self.radius2) * inverse,
+                solid_angle: self.area * self.height * inverse * inverse * inverse,
+            };
+            environment.estimate_radiance(&cone).value
+        });
+        PI * self.root.average * scale * self.estimate(LatticeCell::whole()) * radiance
     }
 }

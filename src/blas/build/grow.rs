@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use crate::blas::barycentric::{ARITY, LatticeCell};
 use crate::blas::build::touched::TexelRange;
-use crate::blas::node::{BLOCK_CELLS, CellBlock, LEAF, Root, append, end, storable};
+use crate::blas::node::{CellNode, LEAF, Root, append, end, storable};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
 
@@ -53,7 +53,7 @@ pub(crate) struct GrownTree {
 
 impl GrownTree {
     /// Adds the tree to the pool. Returns its root and the bytes that it takes.
-    pub(super) fn store(&self, pool: &mut Vec<CellBlock>) -> Result<(Root, f64), Error> {
+    pub(super) fn store(&self, pool: &mut Vec<CellNode>) -> Result<(Root, f64), Error> {
         if self.divided.is_empty() || self.average == 0.0 {
             return Ok((Root::constant(self.average), 0.0));
         }
@@ -61,7 +61,7 @@ impl GrownTree {
         if count >= LEAF as usize {
             return Err(Error(ErrorKind::TooMany { what: "BLAS nodes", count, limit: LEAF as usize }));
         }
-        let bytes = self.averages.len().div_ceil(BLOCK_CELLS) * size_of::<CellBlock>();
+        let bytes = self.averages.len() / ARITY * size_of::<CellNode>();
         Ok((Root { average: self.average, node: append(pool, &self.averages, &self.divided) }, bytes as f64))
     }
 }

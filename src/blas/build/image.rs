@@ -12,7 +12,7 @@ use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
 use crate::blas::build::pyramid::{BYTES_PER_IMAGE, TexturePyramid};
 use crate::blas::build::texture::Texture;
 use crate::blas::build::touched::{self, TexelRange};
-use crate::blas::node::{BLOCK_CELLS, CellBlock, Root, storable};
+use crate::blas::node::{CellNode, Root, storable};
 use crate::error::Error;
 use crate::record::{Filter, Wrap};
 
@@ -84,7 +84,7 @@ const LEAVES_PER_COPY: f64 = 4.0;
 /// If a coordinate is not finite or beyond [`UV_LIMIT`](crate::blas::build::footprint::UV_LIMIT) (a caller that knows
 /// the mesh checks first, with [`check_uv`]; here the error says mesh 0), or if the pool has no more indices. The pool
 /// is then as it was.
-pub(crate) fn build(pyramid: &mut TexturePyramid<'_>, uv: [Vec2; 3], pool: &mut Vec<CellBlock>) -> Result<Root, Error> {
+pub(crate) fn build(pyramid: &mut TexturePyramid<'_>, uv: [Vec2; 3], pool: &mut Vec<CellNode>) -> Result<Root, Error> {
     for (vertex, uv) in uv.into_iter().enumerate() {
         check_uv(0, vertex, uv)?;
     }
@@ -103,7 +103,7 @@ pub(crate) fn build(pyramid: &mut TexturePyramid<'_>, uv: [Vec2; 3], pool: &mut 
     let fine = levels(&uv_triangle);
     let [sharp, blurred] = EXTRA_HALVINGS;
     let extra = if pyramid.texture().filtering() == Filter::Nearest { sharp } else { blurred };
-    let deepest = (fine + extra / LEVEL_HALVINGS).min(MAX_HALVINGS / LEVEL_HALVINGS);
+    let deepest = (fine + nearest_level(extra)).min(MAX_HALVINGS / LEVEL_HALVINGS);
     debug_assert!(LATTICE >> (deepest * LEVEL_HALVINGS) >= 16);
     let source = ImageOnTriangle { pyramid, uv_triangle: &uv_triangle };
     let Ok(tree) = grow(&source, range, &GrowthLimits { nodes, fine, deepest, variance: IMAGE_VARIANCE });
@@ -137,19 +137,22 @@ impl WeightSource for ImageOnTriangle<'_> {
     }
 }
 
-/// How many levels it takes until cells are fine.
+/// How many levels it takes until cells are fine, to the nearest: what a level more would divide is left to the contrast.
 fn levels(uv_triangle: &UvTriangle) -> u32 {
-    let halvings = LEVEL_HALVINGS;
     let (double_area, longest) = uv_triangle.extent();
-    let mut levels = 0;
-    let mut scale = 1.0;
-    while (levels + 1) * halvings <= MAX_HALVINGS
+    let (mut halvings, mut scale) = (0, 1.0);
+    while halvings < MAX_HALVINGS
         && (0.5 * double_area * scale > FINE_AREA || longest * scale > FINE_LENGTH * FINE_LENGTH)
     {
-        levels += 1;
-        scale /= ARITY as f64;
+        halvings += 1;
+        scale *= 0.25;
     }
-    levels
+    nearest_level(halvings)
+}
+
+/// The number of levels whose halvings are nearest to a number of them.
+const fn nearest_level(halvings: u32) -> u32 {
+    (halvings + LEVEL_HALVINGS / 2) / LEVEL_HALVINGS
 }
 
 /// How many bytes a triangle may take.
@@ -177,8 +180,7 @@ impl TreeBudget {
         if uv_triangle.covered() < LEAST_TEXELS {
             return 0;
         }
-        let blocks = ((self.most / size_of::<CellBlock>() as f64) as usize).max(1);
-        let nodes = blocks * BLOCK_CELLS / ARITY;
+        let nodes = ((self.most / size_of::<CellNode>() as f64) as usize).max(1);
         let [w, h] = texture.size().map(f64::from);
         let copies = 0.5 * uv_triangle.extent().0 / (w * h);
         let leaves = ((ARITY - 1) * nodes) as f64;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::opening::{Coverage, Opening};
-use crate::blas::{self, CellTarget, CellWeight, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
+use crate::blas::{self, ARITY, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{BrightFeature, EnvironmentView};
 use crate::light::{LightViewKind, TriangleView};
 use crate::warp::Variate;
@@ -144,7 +144,11 @@ impl CellTarget for FeatureView<'_> {
 
     fn child(&self, (): &(), _index: usize) {}
 
-    fn weigh(&self, at: LatticeCell, (): &mut ()) -> CellWeight {
-        CellWeight { weight: self.power(at), is_final: true }
+    fn weigh_children(&self, at: LatticeCell, (): &(), averages: &[f32; ARITY]) -> [f32; ARITY] {
+        core::array::from_fn(|i| if averages[i] > 0.0 { self.power(at.child(i)) } else { 0.0 })
+    }
+
+    fn is_final(&self, _at: LatticeCell, (): &mut (), _levels: Option<u32>) -> bool {
+        true
     }
 }

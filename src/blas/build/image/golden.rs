@@ -16,7 +16,7 @@ fn quad() -> [[Vec2; 3]; 2] {
 fn golden() {
     let texels = spots(64);
     let mut pyramid = TexturePyramid::new(Texture::new(64, 64, &texels).unwrap().wrap(Wrap::Clamp, Wrap::Clamp));
-    let mut pool = Vec::<CellBlock>::new();
+    let mut pool = Vec::<CellNode>::new();
     let roots = quad().map(|uv| build(&mut pyramid, uv, &mut pool).unwrap());
     // FNV-1a.
     let hash = |bytes: &[u8]| {
