@@ -7,7 +7,7 @@ use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene, random_point};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
 use crate::common::tier::{some, tier};
-use fanlight::{Hit, ShadingPoint, Splitting};
+use fanlight::{Arity, Hit, ShadingPoint, Splitting};
 use glam::Vec3;
 
 /// Significance of all scenes of a test together.
@@ -226,7 +226,7 @@ fn equal_lights_are_chosen_equally_often_at_any_depth() {
         mesh.indices.push([3 * i, 3 * i + 1, 3 * i + 2]);
     }
     scene.meshes.push(mesh);
-    let lights = build(&scene, (4, 4));
+    let lights = build(&scene, Arity::Four);
     let x = ShadingPoint::volume(Vec3::new(2048.0, 0.0, 1e6));
     let mut pcg = Pcg32::new(9, 14);
     let mut observed = vec![0.0; 4096];

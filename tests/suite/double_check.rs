@@ -73,7 +73,7 @@ fn scene(number: usize, pcg: &mut Pcg32) -> (LightSampler, Vec<ShadingPoint>) {
         loop {
             let bytes: Vec<u8> = (0..1500).map(|_| pcg.u32() as u8).collect();
             if let Some(lights) = checks::build::lights(&mut checks::reader::Reader::new(&bytes)) {
-                return (Box::new(lights), points);
+                return (lights, points);
             }
         }
     }

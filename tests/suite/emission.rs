@@ -9,7 +9,7 @@ use crate::common::pcg::Pcg32;
 use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky};
 use crate::common::statistics::Mean;
 use crate::common::tier::some;
-use fanlight::{Emission, EmissionSample, Filter, LightSampler, ShadingPoint};
+use fanlight::{Arity, Emission, EmissionSample, Filter, ShadingPoint};
 use glam::Vec3;
 
 const SCENES: usize = 16;
@@ -78,7 +78,7 @@ fn check(name: &str, make: impl Fn(&mut Pcg32, usize) -> Scene + Sync) {
         let number = numbers[k];
         let mut pcg = Pcg32::new(3000 + number as u64, 31);
         let scene = make(&mut pcg, number);
-        let lights: LightSampler = scene.build();
+        let lights = scene.build(Arity::default());
         let emission = lights.emission();
         assert_agreement(&emission, &mut pcg);
         let mean = photon_power(&scene, &emission, &mut pcg);
@@ -137,7 +137,7 @@ fn rays_through_two_portals_count_once() {
     let mut scene = Scene::new("nested", vec![outer, inner]);
     let mut pcg = Pcg32::new(9, 9);
     scene.sky = Sky::random(&mut pcg, 1);
-    let lights: LightSampler = scene.build();
+    let lights = scene.build(Arity::default());
     let emission = lights.emission();
     // The floor through both, and what the inner one alone would say.
     let through_both = |ray: &EmissionSample| {
@@ -154,7 +154,7 @@ fn rays_through_two_portals_count_once() {
             sky / f64::from(emission.pdf_ray(below, -ray.direction))
         });
         sum.add(value);
-        one.add(if ray.is_some_and(|ray| ray.hit.triangle.mesh == 1) {
+        one.add(if ray.is_some_and(|ray| ray.hit.triangle.mesh.index() == 1) {
             ray.map_or(0.0, |ray| radiance(&scene, &ray) / f64::from(ray.pdf))
         } else {
             0.0
@@ -165,6 +165,72 @@ fn rays_through_two_portals_count_once() {
     assert!(error < 0.02 * one.mean(), "too noisy to tell");
 }
 
+/// A hundred windows: fifty in a ceiling, and as many above them, through which some rays come before.
+fn a_hundred_openings(pcg: &mut Pcg32) -> Scene {
+    let mut scene = Scene::new("openings", Vec::new());
+    for i in 0..100u8 {
+        let [x, y, z] = [i % 10, i / 10 % 5, i / 50].map(f32::from);
+        let corner = Vec3::new(0.2 * x, 0.4 * y, 1.0 + 0.3 * z);
+        scene.meshes.push(LightMesh::quad(corner, 0.3 * Vec3::Y, 0.15 * Vec3::X).portal());
+    }
+    scene.sky = Sky::random(pcg, 1);
+    scene
+}
+
+/// Whether a line passes the edge of any triangle so closely that rounding may decide on which side.
+fn passes_an_edge(scene: &Scene, point: Vec3, along: Vec3) -> bool {
+    const NEAR: f64 = 1e-4;
+    scene.triangles().any(|(m, t)| {
+        let [a, b, c] = scene.meshes[m].vertices(t).map(|v| v.as_dvec3() - point.as_dvec3());
+        let along = along.as_dvec3();
+        let parts = [b.cross(c), c.cross(a), a.cross(b)].map(|normal| normal.dot(along));
+        let least = parts.iter().map(|part| part / parts.iter().sum::<f64>()).fold(1.0, f64::min);
+        least.abs() < NEAR
+    })
+}
+
+/// A ray's own density, asked for where it has landed, counts the opening that it came through, whatever rounding does;
+/// apart from the edges it is the density of any ray there.
+#[test]
+fn the_density_of_a_landed_ray_is_never_below_its_own() {
+    let mut pcg = Pcg32::new(13, 9);
+    let scene = a_hundred_openings(&mut pcg);
+    let lights = scene.build(Arity::default());
+    let emission = lights.emission();
+    let land = |ray: &EmissionSample| ray.position - ray.position.z / ray.direction.z * ray.direction;
+    let (mut drawn, mut compared, mut through_both) = (0, 0, 0);
+    for _ in 0..SAMPLES {
+        let Some(ray) = emission.sample(random(&mut pcg)) else { continue };
+        drawn += 1;
+        let landed = land(&ray);
+        let own = emission.pdf_sample_ray(&ray, landed);
+        assert!(own >= ray.pdf && own.is_finite(), "{ray:?}: {own}");
+        if passes_an_edge(&scene, landed, -ray.direction) {
+            continue;
+        }
+        compared += 1;
+        through_both += usize::from(own > 1.1 * ray.pdf);
+        let any = emission.pdf_ray(landed, -ray.direction);
+        assert!((any / own - 1.0).abs() < 1e-5, "{ray:?}: {own}, but {any} for any ray");
+    }
+    assert!(2 * drawn > SAMPLES, "only {drawn} rays");
+    assert!(100 * compared > 99 * drawn, "only {compared} of {drawn} rays pass no edge");
+    assert!(20 * through_both > drawn, "only {through_both} of {drawn} rays pass two openings");
+    // Rays that start at an edge: on the way back some of them miss their own triangle.
+    let mut missed = 0;
+    for i in 0..20_000 {
+        let mut u = random(&mut pcg);
+        u[1 + i % 2] = [0.0, 1.0 - f32::EPSILON / 2.0][i / 2 % 2];
+        let Some(ray) = emission.sample(u) else { continue };
+        let landed = land(&ray);
+        let own = emission.pdf_sample_ray(&ray, landed);
+        assert!(own >= ray.pdf && own.is_finite(), "{ray:?}: {own}");
+        missed += usize::from(emission.pdf_ray(landed, -ray.direction) < 0.5 * ray.pdf);
+    }
+    assert!(missed > 0, "no ray misses its own triangle: the test shows nothing");
+    println!("{drawn} rays, {through_both} through two openings; {missed} of those from edges miss their own triangle");
+}
+
 #[test]
 fn a_distant_light_passes_portals_by_their_area() {
     for number in some(8) {
@@ -172,7 +238,7 @@ fn a_distant_light_passes_portals_by_their_area() {
         let mut scene = Scene::new("soup", vec![LightMesh::soup(&mut pcg, 12, 0.3).paint(Paint::Image(0)).portal()]);
         scene.images.push(Image { filter: Filter::Nearest, ..Image::random(&mut pcg, 1) });
         scene.sky = Sky::random(&mut pcg, usize::from(number % 2 == 0));
-        let lights: LightSampler = scene.build();
+        let lights = scene.build(Arity::default());
         let emission = lights.emission();
         let direction = pcg.direction();
         let (mut through, mut exact, mut drawn) = (Mean::default(), 0.0, 0);
@@ -210,15 +276,15 @@ fn nothing_comes_out_of_nothing() {
     let opening = LightMesh::quad(Vec3::ZERO, Vec3::X, Vec3::Y).portal();
     let mut scene = Scene::new("dark", vec![opening]);
     scene.sky = Sky::Constant(0.0);
-    let lights: LightSampler = scene.build();
+    let lights = scene.build(Arity::default());
     assert_eq!(lights.emission().sample([0.5; 5]), None);
-    let empty: LightSampler = Scene::new("empty", Vec::new()).build();
+    let empty = Scene::new("empty", Vec::new()).build(Arity::default());
     assert_eq!(empty.emission().sample([0.5; 5]), None);
     assert_eq!(empty.emission().sample_distant(Vec3::X, [0.5; 3]), None);
     assert_eq!(empty.emission().pdf_ray(Vec3::ZERO, Vec3::X), 0.0);
     // A portal that faces up, under a sky that is lit near the zenith alone: no light goes up through it.
     scene.sky = Sky::LatLong { size: [16, 8], texels: (0..128).map(|i| f32::from(u8::from(i < 32))).collect() };
-    let lights: LightSampler = scene.build();
+    let lights = scene.build(Arity::default());
     let mut pcg = Pcg32::new(1, 1);
     let emission = lights.emission();
     for _ in 0..1000 {

@@ -7,8 +7,8 @@ use crate::common::lights::{ARITIES, aligned, build};
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene};
 use fanlight::{
-    Environment, Error, Filter, Hit, LightSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, Receiver,
-    ShadingPoint, Splitting, Texture, TextureId, TriangleId, Weight,
+    Arity, Environment, EnvironmentImage, Error, Filter, Hit, LightSample, LightSampler, LightSamplerBuilder,
+    LightSamplerView, Mesh, MeshId, Receiver, ShadingPoint, Splitting, Texture, TextureId, TriangleId, Weight,
 };
 use glam::{Mat3, Vec2, Vec3};
 use smallvec::SmallVec;
@@ -48,9 +48,11 @@ fn environments() {
     type Build = fn(usize, usize, &[f32]) -> Result<Environment, Error>;
     let builds: [Build; 4] = [
         |w, h, texels| Environment::from_lat_long(w, h, texels, Filter::Nearest),
-        |w, h, texels| Environment::from_lat_long_with_size(w, h, texels, Filter::Bilinear, 4),
+        |w, h, texels| {
+            Environment::new(&EnvironmentImage::lat_long(w, h, texels).filter(Filter::Bilinear).resolution(4))
+        },
         |w, _, texels| Environment::from_equal_area(w, texels, Filter::Bilinear),
-        |w, _, texels| Environment::from_equal_area_with_size(w, texels, Filter::Nearest, 4),
+        |w, _, texels| Environment::new(&EnvironmentImage::equal_area(w, texels).filter(Filter::Nearest).resolution(4)),
     ];
     for build in builds {
         assert_error("no texels", build(0, 0, &[]), &["environment", "0 x 0", "65536"]);
@@ -67,10 +69,10 @@ fn environments() {
     for size in [0, 8193] {
         let number = size.to_string();
         let texels = [1.0; 4];
-        let result = Environment::from_lat_long_with_size(2, 2, &texels, Filter::Nearest, size);
-        assert_error("resolution", result, &["environment", &number, "8192"]);
-        let result = Environment::from_equal_area_with_size(2, &texels, Filter::Nearest, size);
-        assert_error("resolution", result, &["environment", &number, "8192"]);
+        for image in [EnvironmentImage::lat_long(2, 2, &texels), EnvironmentImage::equal_area(2, &texels)] {
+            let result = Environment::new(&image.filter(Filter::Nearest).resolution(size));
+            assert_error("resolution", result, &["environment", &number, "8192"]);
+        }
     }
 }
 
@@ -101,28 +103,31 @@ fn assert_mesh_error(what: &str, mesh: &Mesh<'_>, parts: &[&str]) {
     let texels = [0.0, 1.0, 2.0, 3.0];
     let texture = Texture::new(2, 2, &texels).expect("it is valid");
     let good = |texture| Mesh::portal(&POSITIONS, &INDICES).uvs(&UVS).weight(Weight::Texture(texture));
-    let mut builder = LightSamplerBuilder::<16, 4>::new();
+    let mut builder = LightSampler::builder();
     let id = builder.add_texture(texture);
-    assert_eq!(builder.add_mesh(&good(id)), Ok(0));
+    assert_eq!(builder.add_mesh(&good(id)), Ok(MeshId::from_index(0)));
     assert_error(what, builder.add_mesh(mesh), parts);
-    assert_eq!(builder.add_mesh(&good(id)), Ok(1));
-    let mut reference = LightSamplerBuilder::<16, 4>::new();
+    assert_eq!(builder.add_mesh(&good(id)), Ok(MeshId::from_index(1)));
+    let mut reference = LightSampler::builder();
     let id = reference.add_texture(texture);
-    assert_eq!((reference.add_mesh(&good(id)), reference.add_mesh(&good(id))), (Ok(0), Ok(1)));
-    let bytes = |builder: LightSamplerBuilder<'_, 16, 4>| builder.build().map(|lights| lights.to_bytes());
+    assert_eq!(
+        (reference.add_mesh(&good(id)), reference.add_mesh(&good(id))),
+        (Ok(MeshId::from_index(0)), Ok(MeshId::from_index(1)))
+    );
+    let bytes = |builder: LightSamplerBuilder<'_>| builder.build().map(|lights| lights.to_bytes());
     assert_eq!(bytes(builder), bytes(reference), "{what}: the builder is not as before");
 }
 
 /// A texture of a builder that has more of them than [`assert_mesh_error`]'s.
 fn texture_of_another_builder() -> TextureId {
-    let mut builder = LightSamplerBuilder::<16, 4>::new();
+    let mut builder = LightSampler::builder();
     let texture = Texture::new(1, 1, &[1.0]).expect("it is valid");
     (0..6).for_each(|_| _ = builder.add_texture(texture));
     builder.add_texture(texture)
 }
 
 fn first_texture() -> TextureId {
-    LightSamplerBuilder::<16, 4>::new().add_texture(Texture::new(1, 1, &[1.0]).expect("it is valid"))
+    LightSampler::builder().add_texture(Texture::new(1, 1, &[1.0]).expect("it is valid"))
 }
 
 #[test]
@@ -170,7 +175,7 @@ fn full() -> (Scene, LightSampler) {
     scene.meshes.iter_mut().for_each(|mesh| mesh.uvs.iter_mut().for_each(|uv| *uv *= 0.5));
     scene.sky =
         crate::common::scene::Sky::LatLong { size: [4, 2], texels: vec![1.0, 2.0, 0.0, 4.0, 5.0, 6.0, 7.0, 8.0] };
-    let lights = scene.build::<16, 4>();
+    let lights = scene.build(Arity::Sixteen);
     (scene, lights)
 }
 
@@ -189,15 +194,15 @@ fn exercise(view: &View<'_>, x: &ShadingPoint, u: [f32; 3]) -> usize {
     let single = view.at(x).sample(u);
     single.iter().for_each(check);
     let mut samples = SmallVec::<[LightSample; 8]>::new();
-    view.sample_split(x, u, &splitting, &mut samples);
+    view.at(x).sample_split(u, &splitting, &mut samples);
     samples.iter().for_each(check);
     let direction = Vec3::from(u) - 0.5;
     finite(view.at(x).pdf_direction(direction));
     finite(view.at(x).pdf_split_direction(direction, &splitting));
     for triangle in [0, 1, 2, 3, u32::MAX] {
         for mesh in [0, 3, 4, u32::MAX] {
-            let triangle = TriangleId { mesh, triangle };
-            finite(view.at(x).pdf(&Hit { triangle, barycentrics: [u[0], u[1]] }));
+            let triangle = TriangleId::new(MeshId::from_index(mesh), triangle);
+            finite(view.at(x).pdf(&Hit::new(triangle, [u[0], u[1]])));
             finite(view.at(x).pmf(triangle));
         }
     }
@@ -214,22 +219,49 @@ fn bytes_that_are_cut_off_or_moved() {
     for length in 0..good.len() {
         assert_error("cut off", View::from_bytes(&good[..length]), &["bytes", "expected"]);
     }
-    assert_error(
-        "arity 4",
-        LightSamplerView::<4, 4>::from_bytes(good).map(drop),
-        &["arity", "triangles", "0x10", "0x4"],
-    );
-    assert_error(
-        "arity 16",
-        LightSamplerView::<16, 16>::from_bytes(good).map(drop),
-        &["arity", "texture", "0x4", "0x10"],
-    );
     let mut moved = vec![0; good.len() + 8];
     let start = moved.as_ptr().align_offset(4) + 1;
     moved[start..start + good.len()].copy_from_slice(good);
     assert_error("moved", View::from_bytes(&moved[start..start + good.len()]), &["alignment", "0x1"]);
     words.push(0);
     assert_error("too long", View::from_bytes(bytemuck::cast_slice(&words)), &["number of bytes"]);
+}
+
+/// Where the first section begins, which holds the arities of the trees over lights and over textures.
+fn parameters(words: &[u32]) -> usize {
+    const HEADER: usize = 6;
+    const ENTRY: usize = 4;
+    HEADER + ENTRY * words[4] as usize
+}
+
+/// The arity of bytes is the one that they were built with: it comes back, and bytes that say another are refused.
+#[test]
+fn bytes_of_other_arities() {
+    let (scene, _) = full();
+    let mut pcg = Pcg32::new(8, 28);
+    for (arity, number) in [(Arity::Four, 4), (Arity::Eight, 8), (Arity::Sixteen, 16)] {
+        let lights = build(&scene, arity);
+        let words = aligned(&lights.to_bytes());
+        let parameters = parameters(&words);
+        assert_eq!(words[parameters..parameters + 2], [number, 4]);
+        let view = View::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+        for i in 0..100 {
+            let (x, u) = (crate::common::scene::random_point(&mut pcg, i), pcg.cube());
+            assert_eq!(view.at(&x).sample(u), lights.at(&x).sample(u));
+        }
+        let load = |at: usize, value: u32| {
+            let mut words = words.clone();
+            words[parameters + at] = value;
+            View::from_bytes(bytemuck::cast_slice(&words)).map(drop)
+        };
+        for other in [4, 8, 16].into_iter().filter(|other| *other != number) {
+            assert_error("another arity", load(0, other), &["bytes", "expected"]);
+        }
+        for unknown in [0, 1, 5, 32, u32::MAX] {
+            assert_error("no arity", load(0, unknown), &["arity", "lights", &format!("{unknown:#x}")]);
+        }
+        assert_error("textures of 16", load(1, 16), &["arity", "textures", "0x10", "0x4"]);
+    }
 }
 
 /// Whatever one flipped bit does, the bytes are refused, or sampling works on what they say.
@@ -279,7 +311,7 @@ fn hostile_shading_points_and_numbers() {
         mesh.positions[2] = 0.5 * (mesh.positions[0] + mesh.positions[1]) + Vec3::splat(1e-7);
         mesh.indices[1] = [3, 3, 3];
         mesh.indices[3] = mesh.indices[2];
-        let lights = scene.build::<16, 4>();
+        let lights = scene.build(Arity::Sixteen);
         let view = lights.as_view();
         let mut positions = Vec::new();
         for (m, t) in scene.triangles() {
@@ -318,7 +350,7 @@ fn nothing_arrives_from_no_lights() {
     let mut scene =
         Scene::random(&mut Pcg32::new(1, 27), Content { triangles: 9, textured: true, sky: 0, two_sided: true });
     scene.images.iter_mut().for_each(|image| image.texels.fill(0.0));
-    for arities in ARITIES {
-        assert_eq!(build(&scene, arities).sample(&x, [0.5; 3]), None);
+    for arity in ARITIES {
+        assert_eq!(build(&scene, arity).at(&x).sample([0.5; 3]), None);
     }
 }

@@ -57,7 +57,7 @@ fn normals_of_any_bits_keep_samples_finite() {
     let mut drawn = 0;
     for normal in [Vec3::NAN, Vec3::INFINITY, Vec3::splat(f32::MAX), Vec3::ZERO, Vec3::splat(1e-45)] {
         for receiver in [Receiver::Surface(normal), Receiver::Transmissive(normal)] {
-            let x = ShadingPoint { position: Vec3::new(0.2, 0.2, 1.0), receiver };
+            let x = ShadingPoint::new(Vec3::new(0.2, 0.2, 1.0), receiver);
             if let Some(sample) = lights.at(&x).sample([0.5; 3]) {
                 drawn += 1;
                 assert!(sample.pdf > 0.0 && sample.pdf.is_finite(), "{x:?}");
@@ -95,10 +95,9 @@ fn triangles_and_their_leaves_agree() {
 /// A sky whose only light comes from behind a portal.
 #[test]
 fn no_ray_leaves_where_nothing_is_sent() {
-    let mut builder = LightSampler::builder();
     let texels: Vec<f32> = (0..64).map(|i| if [27, 28, 35, 36].contains(&i) { 1.0 } else { 0.0 }).collect();
     let sky = Environment::from_equal_area(8, &texels, Filter::Nearest).expect("a valid sky");
-    builder.environment(sky);
+    let mut builder = LightSampler::builder().environment(sky);
     builder.add_mesh(&Mesh::portal(&[Vec3::ZERO, Vec3::X, Vec3::Y], &[[0, 1, 2]])).expect("a valid mesh");
     let lights = builder.build().expect("one triangle");
     let emission = lights.emission();

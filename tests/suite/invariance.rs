@@ -6,7 +6,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene, random_point};
 use crate::common::statistics::Mean;
-use fanlight::{Hit, Illumination, LightSample, LightSampler, Receiver, ShadingPoint, TriangleId};
+use fanlight::{Arity, Hit, Illumination, LightSample, LightSampler, Receiver, ShadingPoint, TriangleId};
 use glam::{Mat3, Vec3};
 
 const SCENES: usize = 24;
@@ -45,8 +45,9 @@ fn shuffled(scene: &Scene, x: &ShadingPoint, pcg: &mut Pcg32) -> Changed {
         places.push(place);
     }
     let hit = move |hit: Hit| {
-        let TriangleId { mesh, triangle } = hit.triangle;
-        Hit { triangle: TriangleId { mesh, triangle: places[mesh as usize][triangle as usize] }, ..hit }
+        let TriangleId { mesh, triangle, .. } = hit.triangle;
+        let triangle = places[mesh.index() as usize][triangle as usize];
+        Hit::new(TriangleId::new(mesh, triangle), hit.barycentrics)
     };
     Changed { scene, x: *x, hit: Box::new(hit) }
 }
@@ -59,9 +60,9 @@ fn transformed(scene: &Scene, x: &ShadingPoint, scale: f32, turn: Mat3, shift: V
     let receiver = match x.receiver {
         Receiver::Surface(normal) => Receiver::Surface((turn * normal).normalize()),
         Receiver::Transmissive(normal) => Receiver::Transmissive((turn * normal).normalize()),
-        Receiver::Volume => Receiver::Volume,
+        receiver => receiver,
     };
-    Changed { scene, x: ShadingPoint { position: place(x.position), receiver }, hit: Box::new(|hit| hit) }
+    Changed { scene, x: ShadingPoint::new(place(x.position), receiver), hit: Box::new(|hit| hit) }
 }
 
 /// All turned and shifted, the sky turned with it.
@@ -97,8 +98,8 @@ fn split(scene: &Scene, x: &ShadingPoint, _: &mut Pcg32) -> Changed {
             () if b1 + b2 <= 0.5 => (0, [2.0 * b1, 2.0 * b2]),
             () => (3, [1.0 - 2.0 * b1, 1.0 - 2.0 * b2]),
         };
-        let TriangleId { mesh, triangle } = hit.triangle;
-        Hit { triangle: TriangleId { mesh, triangle: 4 * triangle + part }, barycentrics }
+        let TriangleId { mesh, triangle, .. } = hit.triangle;
+        Hit::new(TriangleId::new(mesh, 4 * triangle + part), barycentrics)
     };
     Changed { scene, x: *x, hit: Box::new(hit) }
 }
@@ -109,7 +110,7 @@ fn turned(scene: &Scene, x: &ShadingPoint, _: &mut Pcg32) -> Changed {
     scene.meshes.iter_mut().for_each(|mesh| mesh.indices.iter_mut().for_each(|[a, b, c]| [*a, *b, *c] = [*b, *c, *a]));
     let hit = |hit: Hit| {
         let [b1, b2] = hit.barycentrics;
-        Hit { barycentrics: [b2, (1.0 - b1 - b2).max(0.0)], ..hit }
+        Hit::new(hit.triangle, [b2, (1.0 - b1 - b2).max(0.0)])
     };
     Changed { scene, x: *x, hit: Box::new(hit) }
 }
@@ -124,7 +125,7 @@ fn rewound(scene: &Scene, x: &ShadingPoint, _: &mut Pcg32) -> Changed {
     let hit = move |hit: Hit| {
         let [b1, b2] = hit.barycentrics;
         let barycentrics = if two_sided[hit.triangle.mesh.index() as usize] { [b2, b1] } else { [b1, b2] };
-        Hit { barycentrics, ..hit }
+        Hit::new(hit.triangle, barycentrics)
     };
     Changed { scene, x: *x, hit: Box::new(hit) }
 }
@@ -156,13 +157,13 @@ fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> (f64, 
 fn what_can_be_drawn_can_be_drawn_in_the_changed_scene() {
     let counts = parallel::map(SCENES, |number| {
         let (scene, mut pcg) = scene(number, [1, 4, 30, 300][number % 4]);
-        let lights = scene.build::<16>();
+        let lights = scene.build(Arity::Sixteen);
         let mut counted = 0;
         for (name, change) in CHANGES {
             for kind in 0..3 {
                 let x = random_point(&mut pcg, kind);
                 let changed = change(&scene, &x, &mut pcg);
-                let other = changed.scene.build::<16>();
+                let other = changed.scene.build(Arity::Sixteen);
                 for _ in 0..200 {
                     let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
                     let (value, cosine) = contribution(&scene, &x, &sample);
@@ -190,13 +191,13 @@ fn the_density_of_one_triangle_moves_with_it() {
         if scene.illumination == Illumination::Boundary {
             scene.illumination = Illumination::default();
         }
-        let lights = scene.build::<16>();
+        let lights = scene.build(Arity::Sixteen);
         let mut ratios = Vec::new();
         for (_, change) in [CHANGES[1], CHANGES[2]] {
             for kind in 0..3 {
                 let x = random_point(&mut pcg, kind);
                 let changed = change(&scene, &x, &mut pcg);
-                let other = changed.scene.build::<16>();
+                let other = changed.scene.build(Arity::Sixteen);
                 for _ in 0..500 {
                     let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
                     let (value, cosine) = contribution(&scene, &x, &sample);
@@ -231,10 +232,10 @@ fn estimates_are_the_same() {
         let (scene, mut pcg) = scene(number, [1, 4, 30, 300][number % 4]);
         let mut failed = Vec::new();
         let x = random_point(&mut pcg, number);
-        let first = estimate(&scene, &scene.build(), &x, &mut pcg);
+        let first = estimate(&scene, &scene.build(Arity::Sixteen), &x, &mut pcg);
         for (name, change) in CHANGES {
             let changed = change(&scene, &x, &mut pcg);
-            let other = estimate(&changed.scene, &changed.scene.build(), &changed.x, &mut pcg);
+            let other = estimate(&changed.scene, &changed.scene.build(Arity::Sixteen), &changed.x, &mut pcg);
             let limit = 4.5 * first.error().hypot(other.error()) + 1e-4 * first.mean();
             if !((first.mean() - other.mean()).abs() <= limit) {
                 failed.push(format!("{} {name} from {x:?}: {} and {}", scene.name, first.mean(), other.mean()));
@@ -259,12 +260,12 @@ fn the_winding_says_which_side_is_lit() {
         let mut both = scene.clone();
         both.meshes[0].two_sided = true;
         let x = ShadingPoint::volume(2.0 * Vec3::from(pcg.cube()) - 0.5);
-        let [one, other, both] = [scene, other, both].map(|scene| scene.build::<16>());
+        let [one, other, both] = [scene, other, both].map(|scene| scene.build(Arity::Sixteen));
         for _ in 0..20 {
             let Some(sample) = both.at(&x).sample(pcg.cube()) else { continue };
             let [b1, b2] = sample.hit.barycentrics;
-            let here = one.pdf(&x, &sample.hit);
-            let there = other.at(&x).pdf(&Hit { barycentrics: [b2, b1], ..sample.hit });
+            let here = one.at(&x).pdf(&sample.hit);
+            let there = other.at(&x).pdf(&Hit::new(sample.hit.triangle, [b2, b1]));
             assert!((here > 0.0) != (there > 0.0), "{here} {there} at {sample:?} from {x:?}");
             if here > 0.0 { front += 1 } else { back += 1 }
         }

@@ -6,8 +6,8 @@ use crate::common::pcg::Pcg32;
 use crate::common::scene::{LightMesh, Scene, Sky};
 use crate::common::statistics::{Mean, chi_square, sidak};
 use fanlight::{
-    Error, Filter, Illumination, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh, MeshId, Procedural,
-    ShadingPoint, Texture, Weight,
+    Arity, Error, Filter, Hit, Illumination, LightSampler, LightSamplerView, Mesh, MeshId, Procedural, ShadingPoint,
+    Texture, TriangleId, Weight,
 };
 use glam::{Mat3, Vec2, Vec3, vec2, vec3};
 
@@ -64,8 +64,8 @@ fn light() -> Scene {
     }
 }
 
-fn sampler(scene: &Scene, function: &dyn Procedural) -> LightSampler {
-    let mut builder = LightSamplerBuilder::new();
+fn sampler(scene: &Scene, function: &dyn Procedural, arity: Arity) -> LightSampler {
+    let mut builder = LightSampler::builder().arity(arity);
     let weight = Weight::Texture(builder.add_procedural(function));
     let LightMesh { positions, indices, uvs, .. } = &scene.meshes[0];
     builder.add_mesh(&Mesh::emitter(positions, indices).uvs(uvs).weight(weight)).expect("the mesh is valid");
@@ -96,7 +96,7 @@ fn examine(lights: &LightSampler, scene: &Scene, x: &ShadingPoint, least_depth: 
     }
     kept.truncate(2000);
     let probes = probes(scene, &kept);
-    let pdf = |hit: &fanlight::Hit| {
+    let pdf = |hit: &Hit| {
         let factor = if wrong && hit.barycentrics[1] > 0.5 { 1.1 } else { 1.0 };
         factor * f64::from(lights.at(x).pdf(hit))
     };
@@ -119,11 +119,7 @@ fn check_density(count: usize, case: impl Fn(usize) -> usize + Sync) {
     let scene = light();
     let found = parallel::map(count, |i| {
         let (function, tolerance) = CASES[case(i) / 3];
-        let lights: LightSampler = match case(i) % 3 {
-            0 => Box::new(sampler::<16, 4>(&scene, function)),
-            1 => Box::new(sampler::<8, 16>(&scene, function)),
-            _ => Box::new(sampler::<8, 64>(&scene, function)),
-        };
+        let lights = sampler(&scene, function, if case(i) % 3 == 0 { Arity::Sixteen } else { Arity::Eight });
         (examine(&lights, &scene, &points()[case(i) % 3], 6, false), tolerance)
     });
     for ((p, integral, worst), tolerance) in found {
@@ -148,22 +144,22 @@ fn samples_of_any_function_follow_the_density() {
 #[test]
 fn a_density_that_is_off_is_found() {
     let scene = light();
-    assert!(examine(&sampler::<16, 4>(&scene, WAVES), &scene, &points()[0], 6, true).0 < 1e-9);
+    assert!(examine(&sampler(&scene, WAVES, Arity::Sixteen), &scene, &points()[0], 6, true).0 < 1e-9);
 }
 
 #[test]
 fn wherever_the_function_is_bright_it_can_be_sampled() {
     let scene = light();
     for function in [DOTS, WAVES, LOOSE] {
-        let lights = sampler::<16, 4>(&scene, function);
+        let lights = sampler(&scene, function, Arity::Sixteen);
         let mut pcg = Pcg32::new(3, 62);
         let mut dark = 0;
         for _ in 0..20_000 {
             let barycentrics = [pcg.f32(), pcg.f32()].map(|b| 0.5 * b);
-            let hit = fanlight::Hit { triangle: fanlight::TriangleId::new(MeshId::from_index(0), 0), barycentrics };
+            let hit = Hit::new(TriangleId::new(MeshId::from_index(0), 0), barycentrics);
             let [a, b, c] = [0, 1, 2].map(|i| scene.meshes[0].uvs[i]);
             let uv = a + barycentrics[0] * (b - a) + barycentrics[1] * (c - a);
-            let pdf = lights.pdf(&points()[0], &hit);
+            let pdf = lights.at(&points()[0]).pdf(&hit);
             if function.weight(uv) > 0.0 {
                 assert!(pdf > 0.0, "{uv} has no density");
             } else if pdf == 0.0 {
@@ -211,7 +207,7 @@ fn a_function_is_as_good_a_guide_as_an_image_of_it() {
     let scene = light();
     for (name, function, is_tight) in [("dots", DOTS, true), ("waves", WAVES, true), ("loose", LOOSE, false)] {
         let [image, unaware] = [512, 0].map(|size| by_image(&scene, function, size));
-        let lights = sampler::<16, 4>(&scene, function);
+        let lights = sampler(&scene, function, Arity::Sixteen);
         println!(
             "{name}: {:?} and {:?} bytes",
             image.as_view().bytes().texture_trees,
@@ -244,7 +240,7 @@ fn cells(count: u32, scale: f32, function: &dyn Procedural) -> usize {
     let mut bytes = lights.to_bytes();
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     let words = crate::common::lights::aligned(&bytes);
-    LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+    LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
     lights.as_view().bytes().texture_trees
 }
 

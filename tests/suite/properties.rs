@@ -78,6 +78,7 @@ fn cosine(x: &ShadingPoint, direction: DVec3) -> f64 {
         Receiver::Surface(normal) => normal.as_dvec3().dot(direction).max(0.0),
         Receiver::Transmissive(normal) => normal.as_dvec3().dot(direction).abs(),
         Receiver::Volume => 1.0,
+        other => unreachable!("{other:?} is none of the three receivers"),
     }
 }
 
@@ -93,9 +94,9 @@ fn crossing([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<(f64, [f64; 2])> 
 
 /// The lights of a soup in a sky of eight by four texels, with all coordinates multiplied.
 fn build(soup: &Soup, texels: &[f32], sky: &[f32], scale: f32) -> LightSampler {
-    let mut builder = LightSampler::builder();
     let image: Vec<f32> = sky.iter().chain(sky).copied().collect();
-    builder.environment(Environment::from_lat_long(8, 4, &image, Filter::Bilinear).expect("the sky is finite"));
+    let sky = Environment::from_lat_long(8, 4, &image, Filter::Bilinear).expect("the sky is finite");
+    let mut builder = LightSampler::builder().environment(sky);
     let texture = builder.add_texture(Texture::new(4, 4, texels).expect("the texels are finite"));
     for (number, (corners, uvs, portal, textured)) in soup.iter().enumerate() {
         let (corners, uvs) = (corners.map(|p| p * scale), uvs.map(Vec2::from));
@@ -193,7 +194,7 @@ fn the_density_of_a_direction_is_the_sum_over_what_it_crosses() {
                 is_clear &= least.abs() > 1e-3 && (least < -1.0 || !is_thin);
                 if least > 0.0 {
                     let triangle = TriangleId::new(MeshId::from_index(number as u32), 0);
-                    sum += lights.at(&x).pdf(&Hit { triangle, barycentrics: barycentrics.map(|b| b as f32) });
+                    sum += lights.at(&x).pdf(&Hit::new(triangle, barycentrics.map(|b| b as f32)));
                 }
             }
             if is_clear {
@@ -228,10 +229,10 @@ fn a_larger_scene_has_the_same_densities() {
     check(strategy, 0.1, |(soup, texels, sky, x, u, exponent)| {
         let scale = 2f32.powi(exponent);
         let (lights, larger) = (build(&soup, &texels, &sky, 1.0), build(&soup, &texels, &sky, scale));
-        let far = ShadingPoint { position: x.position * scale, ..x };
-        let (Some(a), Some(b)) = (lights.at(&x).sample(u), larger.sample(&far, u)) else { return Ok(0) };
-        assert_relative_eq!(lights.at(&x).pdf(&a.hit), larger.pdf(&far, &a.hit), max_relative = 1e-4);
-        assert_relative_eq!(lights.at(&x).pdf(&b.hit), larger.pdf(&far, &b.hit), max_relative = 1e-4);
+        let far = ShadingPoint::new(x.position * scale, x.receiver);
+        let (Some(a), Some(b)) = (lights.at(&x).sample(u), larger.at(&far).sample(u)) else { return Ok(0) };
+        assert_relative_eq!(lights.at(&x).pdf(&a.hit), larger.at(&far).pdf(&a.hit), max_relative = 1e-4);
+        assert_relative_eq!(lights.at(&x).pdf(&b.hit), larger.at(&far).pdf(&b.hit), max_relative = 1e-4);
         Ok(1)
     });
 }

@@ -7,7 +7,8 @@ use crate::common::statistics::Mean;
 use crate::common::tier::some;
 use crate::common::{oracle, parallel};
 use fanlight::{
-    Environment, Error, Filter, Hit, LightSample, LightSampler, Mesh, MeshUpdate, ShadingPoint, TriangleId,
+    Arity, Environment, Error, Filter, Hit, LightSample, LightSampler, Mesh, MeshId, MeshUpdate, ShadingPoint,
+    TriangleId,
 };
 use glam::{DVec3, Quat, Vec3};
 
@@ -41,10 +42,14 @@ fn changed(scene: &Scene, pcg: &mut Pcg32) -> (Scene, Vec<f32>) {
     (scene, scales)
 }
 
+fn update_of<'a>(mesh: u32) -> MeshUpdate<'a> {
+    MeshUpdate::new(MeshId::from_index(mesh))
+}
+
 fn refit(lights: &mut LightSampler, scene: &Scene, scales: &[f32]) {
     let mut updates = Vec::new();
     for (number, mesh) in (0..).zip(&scene.meshes) {
-        let update = MeshUpdate::new(number).moved(&mesh.positions, &mesh.indices);
+        let update = update_of(number).moved(&mesh.positions, &mesh.indices);
         updates.push(scales.get(number as usize).map_or(update, |scale| update.scaled(*scale)));
     }
     lights.refit(&updates).expect("the changes are valid");
@@ -52,14 +57,14 @@ fn refit(lights: &mut LightSampler, scene: &Scene, scales: &[f32]) {
 
 fn samples(lights: &LightSampler, count: usize) -> Vec<Option<LightSample>> {
     let mut pcg = Pcg32::new(1, 32);
-    (0..count).map(|i| lights.sample(&random_point(&mut pcg, i), pcg.cube())).collect()
+    (0..count).map(|i| lights.at(&random_point(&mut pcg, i)).sample(pcg.cube())).collect()
 }
 
 #[test]
 fn without_a_change_every_bit_stays() {
     for number in 0..SCENES {
         let (scene, _) = scene(number, false);
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build(Arity::Sixteen);
         let before = lights.to_bytes();
         lights.refit(&[]).expect("nothing is valid");
         refit(&mut lights, &scene, &[]);
@@ -72,7 +77,7 @@ fn without_a_change_every_bit_stays() {
 fn changes_can_be_taken_back() {
     for number in 0..SCENES {
         let (scene, mut pcg) = scene(number, false);
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build(Arity::Sixteen);
         let before = samples(&lights, 2000);
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
@@ -87,7 +92,7 @@ fn the_density_is_that_of_the_samples() {
     let mut drawn = 0;
     for number in 0..SCENES {
         let (scene, mut pcg) = scene(number, false);
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build(Arity::Sixteen);
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
         for i in 0..3000 {
@@ -113,7 +118,7 @@ fn the_density_integrates_to_one() {
     let found = parallel::map(numbers.len(), |k| {
         let number = numbers[k];
         let (scene, mut pcg) = scene(number, true);
-        let mut lights = scene.build::<4, 4>();
+        let mut lights = scene.build(Arity::Four);
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
         let x = random_point(&mut pcg, 2);
@@ -153,10 +158,10 @@ fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> f64 {
 fn estimates_agree_with_the_integral_and_with_a_new_build() {
     let found = parallel::map(16, |number| {
         let (scene, mut pcg) = scene(4 * (number % 4) + 1 + number / 4 % 2, false);
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build(Arity::Sixteen);
         let (other, scales) = changed(&scene, &mut pcg);
         refit(&mut lights, &other, &scales);
-        let fresh = other.build::<16, 4>();
+        let fresh = other.build(Arity::Sixteen);
         let x = (0..100).map(|i| random_point(&mut pcg, i)).find(|x| lights.at(x).sample([0.5; 3]).is_some());
         let x = x.expect("some point is lit");
         let sent = |m, t, b, direction| oracle::sent(&other, m, t, b, direction);
@@ -183,7 +188,7 @@ fn estimates_agree_with_the_integral_and_with_a_new_build() {
 }
 
 fn id_of(mesh: u32, triangle: u32) -> TriangleId {
-    TriangleId { mesh, triangle }
+    TriangleId::new(MeshId::from_index(mesh), triangle)
 }
 
 /// Three squares above each other, looking down, which a point below sees all.
@@ -198,15 +203,15 @@ fn a_mesh_that_is_off_is_never_sampled() {
         let mut scene = squares();
         scene.meshes.truncate(count);
         scene.meshes.iter_mut().for_each(|mesh| mesh.indices.truncate(if count == 1 { 1 } else { 2 }));
-        let mut lights = scene.build::<16, 4>();
+        let mut lights = scene.build(Arity::Sixteen);
         let x = ShadingPoint::surface(Vec3::new(0.1, 0.0, 0.0), Vec3::Z);
         let sum = |lights: &LightSampler| -> f32 { scene.triangles().map(|t| lights.at(&x).pmf(id(t))).sum() };
         assert!((sum(&lights) - 1.0).abs() < 1e-5);
-        lights.refit(&[MeshUpdate::new(0).scaled(0.0)]).expect("zero is valid");
+        lights.refit(&[update_of(0).scaled(0.0)]).expect("zero is valid");
         let mut pcg = Pcg32::new(9, 33);
         for _ in 0..2000 {
             let sample = lights.at(&x).sample(pcg.cube());
-            assert!(sample.is_none_or(|sample| sample.hit.triangle.mesh != 0));
+            assert!(sample.is_none_or(|sample| sample.hit.triangle.mesh.index() != 0));
             assert_eq!(sample.is_some(), count > 1);
         }
         assert_eq!(lights.at(&x).pmf(id_of(0, 0)), 0.0);
@@ -214,7 +219,7 @@ fn a_mesh_that_is_off_is_never_sampled() {
         assert_eq!(lights.at(&x).pdf_direction(Vec3::Z) > 0.0, count > 1);
         let rest = if count > 1 { 1.0 } else { 0.0 };
         assert!((sum(&lights) - rest).abs() < 1e-5, "{count}: {}", sum(&lights));
-        lights.refit(&[MeshUpdate::new(0).scaled(1.0)]).expect("one is valid");
+        lights.refit(&[update_of(0).scaled(1.0)]).expect("one is valid");
         assert!((sum(&lights) - 1.0).abs() < 1e-5 && lights.at(&x).pmf(id_of(0, 0)) > 0.0);
     }
 }
@@ -234,8 +239,7 @@ fn suns_are_seen_through_the_portals_that_are_on() {
         let corner = distance * sun - 0.5 * (side + across);
         *mesh = LightMesh::quad(corner, across, side).portal();
     }
-    let mut builder = LightSampler::builder();
-    builder.environment(sky);
+    let mut builder = LightSampler::builder().environment(sky);
     for mesh in &scene.meshes {
         builder.add_mesh(&Mesh::portal(&mesh.positions, &mesh.indices)).expect("the mesh is valid");
     }
@@ -248,22 +252,22 @@ fn suns_are_seen_through_the_portals_that_are_on() {
             let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
             let again = lights.at(&x).pdf(&sample.hit);
             assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{} {again}", sample.pdf);
-            count += usize::from(sample.hit.triangle.mesh == mesh && sample.direction.dot(sun) > 0.99);
+            count += usize::from(sample.hit.triangle.mesh.index() == mesh && sample.direction.dot(sun) > 0.99);
         }
         count
     };
     assert!(into_sun(&lights, 0) > 1000);
-    lights.refit(&[MeshUpdate::new(0).scaled(0.0)]).expect("zero is valid");
+    lights.refit(&[update_of(0).scaled(0.0)]).expect("zero is valid");
     assert_eq!(into_sun(&lights, 0), 0);
     assert!(into_sun(&lights, 1) > 1000);
-    lights.refit(&[MeshUpdate::new(0).scaled(0.0), MeshUpdate::new(1).scaled(1e-20)]).expect("they are valid");
+    lights.refit(&[update_of(0).scaled(0.0), update_of(1).scaled(1e-20)]).expect("they are valid");
     assert!(into_sun(&lights, 1) < 100 && into_sun(&lights, 2) > 0);
 }
 
 #[test]
 fn triangles_may_lose_their_area_and_get_it_back() {
     let scene = squares();
-    let mut lights = scene.build::<4, 4>();
+    let mut lights = scene.build(Arity::Four);
     let x = ShadingPoint::surface(Vec3::new(0.1, 0.0, 0.0), Vec3::Z);
     let before = lights.at(&x).pmf(id_of(1, 1));
     let mut flat = scene.clone();
@@ -293,26 +297,26 @@ fn bad_changes_are_refused_and_change_nothing() {
     // From here on the second triangle of the last mesh has no area.
     scene.meshes[2].indices[1] = [0, 0, 3];
     scene.meshes[2].paint = Paint::Constant(1e20);
-    let mut lights = scene.build::<16, 4>();
-    let good = MeshUpdate::new(0).scaled(3.0);
+    let mut lights = scene.build(Arity::Sixteen);
+    let good = update_of(0).scaled(3.0);
     let refuse =
         |lights: &mut LightSampler, bad: MeshUpdate<'_>, parts: &[&str]| assert_refused(lights, &[good, bad], parts);
-    refuse(&mut lights, MeshUpdate::new(3), &["mesh 3", "has 3"]);
+    refuse(&mut lights, update_of(3), &["mesh 3", "has 3"]);
     for (bad, name) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf"), (-1.0, "-1"), (2e30, "20000000000")] {
-        refuse(&mut lights, MeshUpdate::new(1).scaled(bad), &["mesh 1", name, "1e30"]);
+        refuse(&mut lights, update_of(1).scaled(bad), &["mesh 1", name, "1e30"]);
     }
-    refuse(&mut lights, MeshUpdate::new(2).scaled(1e11), &["mesh 2", "1e30"]);
+    refuse(&mut lights, update_of(2).scaled(1e11), &["mesh 2", "1e30"]);
     let LightMesh { positions, indices, .. } = &scene.meshes[1];
-    refuse(&mut lights, MeshUpdate::new(1).moved(positions, &indices[..1]), &["mesh 1", "1 triangles", "with 2"]);
-    refuse(&mut lights, MeshUpdate::new(1).moved(&positions[..3], indices), &["mesh 1", "vertex 3", "are 3"]);
+    refuse(&mut lights, update_of(1).moved(positions, &indices[..1]), &["mesh 1", "1 triangles", "with 2"]);
+    refuse(&mut lights, update_of(1).moved(&positions[..3], indices), &["mesh 1", "vertex 3", "are 3"]);
     for bad in [f32::NAN, f32::INFINITY, 2e9] {
         let mut positions = positions.clone();
         positions[2].y = bad;
-        refuse(&mut lights, MeshUpdate::new(1).moved(&positions, indices), &["mesh 1", "vertex 2"]);
+        refuse(&mut lights, update_of(1).moved(&positions, indices), &["mesh 1", "vertex 2"]);
     }
-    let update = MeshUpdate::new(2).moved(positions, indices);
+    let update = update_of(2).moved(positions, indices);
     refuse(&mut lights, update, &["mesh 2", "triangle 1", "no", "area"]);
-    let same = MeshUpdate::new(2).moved(positions, &scene.meshes[2].indices);
+    let same = update_of(2).moved(positions, &scene.meshes[2].indices);
     lights.refit(&[good, same]).expect("a triangle without area may stay so");
 }
 
@@ -320,7 +324,7 @@ fn bad_changes_are_refused_and_change_nothing() {
 fn decay_tells_what_a_motion_does_to_the_tree() {
     let mut pcg = Pcg32::new(12, 33);
     let scene = Scene::new("soup", vec![LightMesh::soup(&mut pcg, 2000, 0.03)]);
-    let mut lights = scene.build::<16, 4>();
+    let mut lights = scene.build(Arity::Sixteen);
     let mut decay = |change: &mut dyn FnMut(usize, Vec3) -> Vec3| {
         let mut moved = scene.clone();
         moved.meshes[0].positions.iter_mut().enumerate().for_each(|(i, p)| *p = change(i / 3, *p));
@@ -362,14 +366,14 @@ fn decay_goes_with_noise() {
     let mut pcg = Pcg32::new(14, 33);
     let scene = Scene::new("soup", vec![LightMesh::soup(&mut pcg, 10_000, 0.014)]);
     let offsets: Vec<Vec3> = (0..10_000).map(|_| pcg.direction()).collect();
-    let mut lights = scene.build::<16, 4>();
+    let mut lights = scene.build(Arity::Sixteen);
     let mut ratios = Vec::new();
     for distance in [0.02, 0.08, 0.16, 0.3] {
         let mut moved = scene.clone();
         let positions = moved.meshes[0].positions.iter_mut().enumerate();
         positions.for_each(|(i, p)| *p += distance * offsets[i / 3]);
         refit(&mut lights, &moved, &[]);
-        let ratio = noise(&lights) / noise(&moved.build::<16, 4>());
+        let ratio = noise(&lights) / noise(&moved.build(Arity::Sixteen));
         println!("moved by {distance}: decay {:.2}, variance {ratio:.2} times that of a new build", lights.decay());
         ratios.push((lights.decay(), ratio));
     }
@@ -381,11 +385,11 @@ fn decay_goes_with_noise() {
 #[test]
 fn bytes_hold_what_has_changed() {
     let (scene, mut pcg) = scene(6, false);
-    let mut lights = scene.build::<16, 4>();
+    let mut lights = scene.build(Arity::Sixteen);
     let (other, scales) = changed(&scene, &mut pcg);
     refit(&mut lights, &other, &scales);
     let words = crate::common::lights::aligned(&lights.to_bytes());
-    let view = fanlight::LightSamplerView::<16, 4>::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes load");
+    let view = fanlight::LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("the bytes load");
     for i in 0..2000 {
         let (x, u) = (random_point(&mut pcg, i), pcg.cube());
         assert_eq!(view.at(&x).sample(u), lights.at(&x).sample(u));

@@ -53,9 +53,8 @@ impl Wall {
             .map(|k| f32::from(u8::from([k % side, k / side].iter().all(|texel| texel % 64 < 32))))
             .collect();
         let mask = Texture::new(side, side, &mask).expect("a mask").filter(Filter::Nearest);
-        let mut builder = LightSampler::builder();
+        let mut builder = LightSampler::builder().environment(environment());
         let mask = Weight::Texture(builder.add_texture(mask));
-        builder.environment(environment());
         let mut add = |from: [f32; 2], to: [f32; 2], y: f32, weight: Weight| {
             let corner = |x: f32, z: f32| Vec3::new(x, y, 1.5 + z);
             let quad = [corner(from[0], from[1]), corner(to[0], from[1]), corner(to[0], to[1]), corner(from[0], to[1])];
@@ -162,7 +161,7 @@ fn check_irradiance(wall: Wall, largest: f64) {
         if wall != Wall::Nested {
             estimates.push(estimate(20_000, || {
                 let mut samples = SmallVec::<[LightSample; 16]>::new();
-                lights.sample_split(&x, pcg.cube(), &splitting, &mut samples);
+                lights.at(&x).sample_split(pcg.cube(), &splitting, &mut samples);
                 samples.iter().map(|s| value(s, s.pdf)).sum()
             }));
         }
@@ -213,7 +212,7 @@ fn split_samples_have_the_density_that_pdf_split_finds() {
     for x in points() {
         for _ in 0..500 {
             let mut samples = SmallVec::<[LightSample; 16]>::new();
-            lights.sample_split(&x, pcg.cube(), &splitting, &mut samples);
+            lights.at(&x).sample_split(pcg.cube(), &splitting, &mut samples);
             for sample in samples {
                 drawn += 1;
                 let hit: Hit = sample.hit;

@@ -13,11 +13,11 @@ pub(crate) fn lights(reader: &mut Reader<'_>) -> Option<LightSampler> {
     let meshes: Vec<Soup> = (0..1 + reader.below(3)).map(|_| Soup::read(reader)).collect();
     let mut builder = LightSampler::builder();
     if let Some(environment) = environment(reader) {
-        builder.environment(environment);
+        builder = builder.environment(environment);
     }
     let terms =
         [Illumination::default(), Illumination::Conservative, Illumination::PointToPoint, Illumination::Boundary];
-    builder.illumination(terms[reader.below(terms.len())]);
+    builder = builder.illumination(terms[reader.below(terms.len())]);
     let textures: Vec<TextureId> =
         images.iter().filter_map(|image| Some(builder.add_texture(image.texture()?))).collect();
     for soup in &meshes {
@@ -43,7 +43,7 @@ fn some_lights(kind: u8) -> LightSampler {
         [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [0, 4, 8], [1, 5, 9], [2, 6, 10], [3, 7, 11], [0, 5, 11]];
     let mut builder = LightSampler::builder();
     if kind & 1 != 0 {
-        builder.environment(Environment::from_lat_long(4, 2, &sky, Filter::Nearest).expect("a valid sky"));
+        builder = builder.environment(Environment::from_lat_long(4, 2, &sky, Filter::Nearest).expect("a valid sky"));
     }
     let texture = builder.add_texture(Texture::new(2, 2, &texels).expect("a valid texture"));
     let weight = if kind & 2 != 0 { Weight::Texture(texture) } else { Weight::Constant(1.0) };

@@ -73,7 +73,7 @@ fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
     }
     let mut samples = SmallVec::<[LightSample; 8]>::new();
     let splitting = Splitting::new(reader.float(), reader.below(3) as u32);
-    lights.sample_split(&x, u, &splitting, &mut samples);
+    at.sample_split(u, &splitting, &mut samples);
     for sample in &samples {
         check_numbers(sample);
         if is_ordinary(&x) {
@@ -95,7 +95,7 @@ fn is_ordinary(x: &ShadingPoint) -> bool {
     x.position.abs().max_element() <= POSITION_LIMIT
         && match x.receiver {
             Receiver::Surface(normal) | Receiver::Transmissive(normal) => (normal.length() - 1.0).abs() < 1e-5,
-            Receiver::Volume => true,
+            _ => true,
         }
 }
 

@@ -28,8 +28,8 @@ fn room() -> Result<LightSampler, Error> {
         [Vec3::new(-1.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 2.5), Vec3::new(-1.0, 0.0, 2.5)];
     let lamp =
         [Vec3::new(-0.2, -2.0, 2.9), Vec3::new(-0.2, -1.6, 2.9), Vec3::new(0.2, -1.6, 2.9), Vec3::new(0.2, -2.0, 2.9)];
-    let mut builder = LightSampler::builder();
-    builder.environment(Environment::from_lat_long(32, 16, &sky, Filter::Bilinear)?);
+    let sky = Environment::from_lat_long(32, 16, &sky, Filter::Bilinear)?;
+    let mut builder = LightSampler::builder().environment(sky);
     let lattice = builder.add_texture(Texture::new(64, 64, &panes)?);
     builder.add_mesh(&Mesh::portal(&window, &QUAD).uvs(&UVS).weight(Weight::Texture(lattice)))?;
     builder.add_mesh(&Mesh::emitter(&lamp, &QUAD).weight(Weight::Constant(10.0)))?;
@@ -54,7 +54,7 @@ pub extern "C" fn main() -> i32 {
         let Some(sample) = sampler.at(&on_floor).sample(u) else { continue };
         let pdf = sampler.at(&on_floor).pdf(&sample.hit);
         assert!((pdf - sample.pdf).abs() <= 1e-5 * sample.pdf, "sampled with {}, found {pdf}", sample.pdf);
-        if sample.hit.triangle.mesh == 0 { portal += 1 } else { emitter += 1 }
+        if sample.hit.triangle.mesh.index() == 0 { portal += 1 } else { emitter += 1 }
     }
     assert!(portal > 0 && emitter > 0, "both lights are seen");
     let bytes = sampler.to_bytes();

@@ -47,7 +47,7 @@ pub(crate) fn point(scene: &Scene, column: usize, receiver: usize) -> ShadingPoi
     .as_vec3()
     .normalize();
     let receiver = [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][receiver];
-    ShadingPoint { position: position.as_vec3(), receiver }
+    ShadingPoint::new(position.as_vec3(), receiver)
 }
 
 /// A normal over whose horizon a tip rises, but not the centre.
@@ -63,5 +63,6 @@ pub(crate) fn receiver_name(x: &ShadingPoint) -> &'static str {
         Receiver::Surface(_) => "surface",
         Receiver::Transmissive(_) => "transmissive",
         Receiver::Volume => "volume",
+        other => unreachable!("{other:?} is none of the three receivers"),
     }
 }

@@ -138,6 +138,7 @@ pub(crate) fn over_polygon(polygon: &[DVec3], receiver: &Receiver) -> f64 {
         Receiver::Surface(normal) => above(polygon, normal.as_dvec3()),
         Receiver::Transmissive(normal) => above(polygon, normal.as_dvec3()) + above(polygon, -normal.as_dvec3()),
         Receiver::Volume => (1..polygon.len() - 1).map(|i| solid_angle([polygon[0], polygon[i], polygon[i + 1]])).sum(),
+        other => unreachable!("{other:?} is none of the three receivers"),
     }
 }
 

@@ -2,13 +2,13 @@
 
 use core::fmt::Write;
 
-use fanlight::{Hit, LightSample, TriangleId};
+use fanlight::{Hit, LightSample, PointSampler, TriangleId};
 use glam::Vec3;
 
 use super::columns;
 use super::measure::{Effort, Found, describe, measure};
 use super::rows::{self, Sizes};
-use crate::common::lights::{Point, build};
+use crate::common::lights::{ARITIES, Point, build};
 use crate::common::parallel;
 
 /// Bars of the errors.
@@ -16,8 +16,7 @@ const NORMALISATION: f64 = 1e-4;
 const AGREEMENT: f64 = 1e-5;
 const IRRADIANCE: f64 = 1e-3;
 
-/// Arities of the trees over triangles and over textures; each with lights of one and of two sides.
-const ARITIES: [(usize, usize); 3] = [(8, 4), (4, 4), (16, 4)];
+/// Every arity, with lights of one and of two sides.
 const VARIANTS: usize = 2 * ARITIES.len();
 const RECEIVERS: usize = 3;
 /// A combination that misses a bar is done again with so many times the samples.
@@ -214,7 +213,7 @@ fn table() {
 }
 
 /// A density that is too large by a tenth on a part of each triangle, of samples, too.
-struct Wrong<'a>(Box<dyn Point + 'a>);
+struct Wrong<'a>(PointSampler<'a>);
 
 impl Wrong<'_> {
     fn factor(barycentrics: [f32; 2]) -> f32 {
@@ -224,7 +223,9 @@ impl Wrong<'_> {
 
 impl Point for Wrong<'_> {
     fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
-        self.0.sample(u).map(|s| LightSample { pdf: Self::factor(s.hit.barycentrics) * s.pdf, ..s })
+        let mut sample = self.0.sample(u)?;
+        sample.pdf *= Self::factor(sample.hit.barycentrics);
+        Some(sample)
     }
 
     fn pdf(&self, hit: &Hit) -> f32 {

@@ -1,6 +1,6 @@
 //! Random numbers at their limits, and how many choices they last for.
 
-use fanlight::ShadingPoint;
+use fanlight::{Arity, LightSampler, ShadingPoint};
 use glam::Vec3;
 
 use crate::common::density::id;
@@ -63,12 +63,12 @@ fn lights_of_all_sizes_are_chosen_with_their_probability() {
         mesh.indices.push([3 * i, 3 * i + 1, 3 * i + 2]);
     }
     let scene = Scene::new("chain", vec![mesh]);
-    for arities in [(4, 4), (8, 4), (16, 4)] {
-        let lights = build(&scene, arities);
+    for arity in [Arity::Four, Arity::Eight, Arity::Sixteen] {
+        let lights = build(&scene, arity);
         let x = ShadingPoint::volume(Vec3::new(0.0, 0.0, 1e-9));
         let [observed, expected] = histogram(&scene, &lights, &x, 500_000);
         let (p, dump) = chi_square(&observed, &expected);
-        assert!(p > SIGNIFICANCE, "{arities:?}: p = {p}\n{dump}");
+        assert!(p > SIGNIFICANCE, "{arity:?}: p = {p}\n{dump}");
     }
 }
 

@@ -53,6 +53,7 @@ impl<'a> Rows<'a> {
                 self.above(polygon, Some(normal.as_dvec3())) + self.above(polygon, Some(-normal.as_dvec3()))
             }
             Receiver::Volume => self.above(polygon, None),
+            other => unreachable!("{other:?} is none of the three receivers"),
         }
     }
 

@@ -116,7 +116,7 @@ fn a_bright_texel_far_away_costs_no_precision() {
 
 #[test]
 fn weights_of_a_half_square() {
-    let half = Polygon::new([[2.0, 3.0], [3.0, 3.0], [2.0, 4.0]]);
+    let half = FootprintPolygon::new([[2.0, 3.0], [3.0, 3.0], [2.0, 4.0]]);
     let [w00, w10, w01, w11] = bilinear_weights(&half, [2.0, 3.0]);
     assert!((w11 - 1.0 / 24.0).abs() < 1e-15);
     assert!((w10 - 1.0 / 8.0).abs() < 1e-15 && (w01 - 1.0 / 8.0).abs() < 1e-15);
