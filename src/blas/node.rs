@@ -53,13 +53,18 @@ impl CellNode {
     }
 }
 
-/// Relative average weights over the cells of a node. Positive wherever any lookup in the cell is.
+/// Reads the relative average weights over the cells of a node. Positive wherever any lookup in the cell is.
 #[inline(always)]
-pub(crate) fn averages(nodes: &[CellNode], node: u32) -> [f32; ARITY] {
-    let mut averages = [0.0; ARITY];
+pub(crate) fn read_averages(nodes: &[CellNode], node: u32, averages: &mut [f32; ARITY]) {
     for (average, code) in averages.iter_mut().zip(nodes[node as usize].codes()) {
         *average = decode(*code);
     }
+}
+
+/// [`read_averages`] into an array of their own.
+pub(crate) fn averages(nodes: &[CellNode], node: u32) -> [f32; ARITY] {
+    let mut averages = [0.0; ARITY];
+    read_averages(nodes, node, &mut averages);
     averages
 }
 

@@ -127,40 +127,39 @@ impl VectorLookup<'_> {
         start.wrapping_add(y.wrapping_mul(side)).wrapping_add(x)
     }
 
-    /// Returns the estimates, over the mean radiance. One is zero only if its region is black. `covering` counts only where
+    /// Writes the estimates, over the mean radiance. One is zero only if its region is black. `covering` counts only where
     /// [`Self::needs_covering`] says so.
     #[inline(always)]
     pub(crate) fn relative_radiances<const LANES: usize>(
         &self,
         nearest: &[u32; LANES],
         covering: &[u32; LANES],
-    ) -> [f32; LANES] {
-        let mut radiances = self.gather(nearest);
+        radiances: &mut [f32; LANES],
+    ) {
+        self.gather(nearest, radiances);
         if self.needs_covering {
-            let wide = self.gather(covering);
+            let mut wide = [0.0; LANES];
+            self.gather(covering, &mut wide);
             for (radiance, wide) in radiances.iter_mut().zip(&wide) {
                 let value = (*radiance * (1.0 - COVERING_SHARE) + *wide * COVERING_SHARE) * self.inverse_mean;
                 *radiance = only_if(*wide > 0.0, at_least(value, f32::MIN_POSITIVE));
             }
         } else {
             let scale = (1.0 - MEAN_SHARE) * self.inverse_mean;
-            for radiance in &mut radiances {
+            for radiance in radiances {
                 *radiance = *radiance * scale + MEAN_SHARE;
             }
         }
-        radiances
     }
 
     /// Fetches texels.
     #[inline(always)]
-    fn gather<const LANES: usize>(&self, texels: &[u32; LANES]) -> [f32; LANES] {
-        let mut values = [0.0; LANES];
-        let Some((first, _)) = self.filtered.split_first() else { return values };
+    fn gather<const LANES: usize>(&self, texels: &[u32; LANES], values: &mut [f32; LANES]) {
+        let Some((first, _)) = self.filtered.split_first() else { return };
         for (value, texel) in values.iter_mut().zip(texels) {
             // A look whether the texel is there that is no branch.
             *value = *self.filtered.get(*texel as usize).unwrap_or(first);
         }
-        values
     }
 }
 

@@ -119,7 +119,8 @@ impl<'a> CellKernel<'a> {
         at: LatticeCell,
         cell: &SpatialCell,
         averages: &[f32; ARITY],
-    ) -> [f32; ARITY] {
+        weights: &mut [f32; ARITY],
+    ) {
         let [v0, v1, v2] = cell.corners;
         let (e1, e2) = (v1 - v0, v2 - v0);
         let [h0, h1, h2] = cell.heights;
@@ -133,24 +134,26 @@ impl<'a> CellKernel<'a> {
         let softening = SOFTENING * area;
         let texels = VectorLookup::texels_of(area_by_height);
         let radius = if COVERING { sqrt(self.view.radius2 * share) + CENTER_ROUNDING * self.extent() } else { 0.0 };
-        let (mut weights, mut nearest, mut covering) = ([0.0; ARITY], [0; ARITY], [0; ARITY]);
+        // Everything that the loop needs is a local value: what is behind a reference might be what the loop writes.
+        let (receiver, horizon, least_distance2) = (self.weights, self.horizon, self.least_distance2);
+        let (v0, e1, e2) = (v0.to_array(), e1.to_array(), e2.to_array());
+        let lookup = self.background.map(|background| background.lookup);
+        let (mut nearest, mut covering) = ([0; ARITY], [0; ARITY]);
         for i in 0..ARITY {
             let (b1, b2, turn) = (CHILD_CENTERS.b1[i], CHILD_CENTERS.b2[i], CHILD_CENTERS.scale[i]);
-            let center =
-                [v0.x + (e1.x * b1 + e2.x * b2), v0.y + (e1.y * b1 + e2.y * b2), v0.z + (e1.z * b1 + e2.z * b2)];
-            let [x, y, z] = center;
-            let distance2 = at_least(x * x + y * y + z * z, self.least_distance2);
+            let [x, y, z] = [0, 1, 2].map(|k| v0[k] + (e1[k] * b1 + e2[k] * b2));
+            let distance2 = at_least(x * x + y * y + z * z, least_distance2);
             let distance = sqrt(distance2);
             let height = h0 + (h1 * b1 + h2 * b2);
             let heights = [height + turn * farther[0], height + turn * farther[1], height + turn * farther[2]];
-            let toward = self.weights.mean(heights, distance);
+            let toward = receiver.mean(heights, distance);
             let softened = distance2 + softening;
             let weight = at_least(scale * toward / (softened * softened), LEAST_WEIGHT);
             let highest = at_least(at_least(heights[0], heights[1]), heights[2]);
-            weights[i] = if highest < self.horizon { 0.0 } else { weight };
+            weights[i] = if highest < horizon { 0.0 } else { weight };
             if LOOKUP {
-                if let Some(Background { lookup, .. }) = &self.background {
-                    let point = direction_to_square(center, distance);
+                if let Some(lookup) = lookup {
+                    let point = direction_to_square([x, y, z], distance);
                     nearest[i] = lookup.nearest(point, texels * (distance2 * distance));
                     if COVERING {
                         covering[i] = lookup.covering(point, radius / distance);
@@ -159,18 +162,16 @@ impl<'a> CellKernel<'a> {
             }
         }
         if self.view.illumination != Illumination::ClampedVertices {
-            self.estimate_one_by_one(at, averages, &mut weights);
+            self.estimate_one_by_one(at, averages, weights);
         }
-        if LOOKUP {
-            if let Some(Background { lookup, .. }) = &self.background {
-                let radiances = lookup.relative_radiances(&nearest, &covering);
-                for i in 0..ARITY {
-                    let weight = at_least(weights[i] * radiances[i], LEAST_WEIGHT);
-                    weights[i] = only_if(weights[i] > 0.0 && radiances[i] > 0.0, weight);
-                }
+        if let Some(lookup) = lookup.filter(|_| LOOKUP) {
+            let mut radiances = [0.0; ARITY];
+            lookup.relative_radiances(&nearest, &covering, &mut radiances);
+            for (weight, radiance) in weights.iter_mut().zip(radiances) {
+                let product = at_least(*weight * radiance, LEAST_WEIGHT);
+                *weight = only_if(*weight > 0.0 && radiance > 0.0, product);
             }
         }
-        weights
     }
 
     /// Replaces the weights of the geometry by those of another strategy.
@@ -231,16 +232,16 @@ impl CellTarget for CellKernel<'_> {
     }
 
     #[inline(always)]
-    fn weigh_children(&self, at: LatticeCell, cell: &SpatialCell, averages: &[f32; ARITY]) -> [f32; ARITY] {
+    fn weigh_children(&self, at: LatticeCell, cell: &SpatialCell, averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
         match &self.background {
             Some(background) if !cell.has_constant_radiance => {
                 if background.lookup.needs_covering {
-                    self.weigh::<true, true>(at, cell, averages)
+                    self.weigh::<true, true>(at, cell, averages, weights)
                 } else {
-                    self.weigh::<true, false>(at, cell, averages)
+                    self.weigh::<true, false>(at, cell, averages, weights)
                 }
             }
-            _ => self.weigh::<false, false>(at, cell, averages),
+            _ => self.weigh::<false, false>(at, cell, averages, weights),
         }
     }
 

@@ -76,8 +76,8 @@ impl CellTarget for Everywhere {
     fn child(&self, (): &(), _index: usize) {}
 
     #[inline(always)]
-    fn weigh_children(&self, _at: LatticeCell, (): &(), _averages: &[f32; ARITY]) -> [f32; ARITY] {
-        [1.0; ARITY]
+    fn weigh_children(&self, _at: LatticeCell, (): &(), _averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
+        *weights = [1.0; ARITY];
     }
 
     #[inline(always)]

@@ -58,6 +58,12 @@ const TEXELS_OF_COPIES: f64 = (1 << 15) as f64;
 /// Bytes for one triangle, at most. A budget: it bounds what one large image can take.
 const IMAGE_TREE_BYTES: f64 = (1 << 22) as f64;
 
+/// How many shares of [`BYTES_PER_IMAGE`] a triangle may take at most, as long as any are left: where an image is detailed
+/// in a few places, most triangles take next to nothing of theirs.
+///
+/// A budget: less leaves the few triangles with the detail coarse, more lets the first triangles take all.
+const MOST_SHARES: f64 = 4.0;
+
 /// A triangle that covers fewer texels has no tree. One that covers as many may have a block, whatever it takes.
 ///
 /// *Measured* (ACCURACY.md, "Constants of the trees over textures"): with twice the value a triangle over five texels
@@ -172,7 +178,7 @@ impl TreeBudget {
         let own = if covered <= seen { covered } else { covered.min((0.25 * seen).max(TEXELS_OF_COPIES)) };
         let own = (BYTES_PER_TEXEL * own).min(IMAGE_TREE_BYTES);
         let share = (covered / (size[0] * size[1])).min(1.0);
-        Self { own, most: own.max((BYTES_PER_IMAGE * share).min(own + pyramid.extra)) }
+        Self { own, most: own.max((MOST_SHARES * BYTES_PER_IMAGE * share).min(own + pyramid.extra)) }
     }
 
     /// The number of nodes that there is memory for, 0 if dividing would not help.

@@ -7,7 +7,8 @@ use super::guide::Guide;
 use super::target::CellTarget;
 use crate::blas::barycentric::{ARITY, EDGE_CELLS, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
 use crate::blas::node::{self, CellNode, LEAF, Root};
-use crate::warp::{keep_possible, sum_wide};
+use crate::math::only_if;
+use crate::warp::{keep_positive, sum_wide, within_range};
 
 /// The smallest cell that can be divided, in lattice units.
 const SMALLEST_DIVISIBLE: u32 = LATTICE >> (MAX_HALVINGS - LEVEL_HALVINGS);
@@ -44,10 +45,12 @@ pub(crate) fn descend_below<T: CellTarget>(
             break;
         }
         levels += u32::from(is_constant);
-        let averages = if is_constant { [1.0; ARITY] } else { node::averages(nodes, node) };
-        let found = target.weigh_children(at, &cell, &averages);
-        let mut weights: [f32; ARITY] = core::array::from_fn(|i| averages[i] * found[i]);
-        keep_possible(&mut weights, |i| averages[i] > 0.0 && found[i] > 0.0);
+        let (mut averages, mut weights) = ([1.0; ARITY], [0.0; ARITY]);
+        if !is_constant {
+            node::read_averages(nodes, node, &mut averages);
+        }
+        target.weigh_children(at, &cell, &averages, &mut weights);
+        multiply(&mut weights, &averages);
         let groups = group_sums(&weights);
         let total = sum_wide(&groups);
         if total == 0.0 {
@@ -64,6 +67,17 @@ pub(crate) fn descend_below<T: CellTarget>(
         (at, cell) = (at.child(index), target.child(&cell, index));
     }
     Some((at, pmf))
+}
+
+/// Multiplies weights by averages. What is possible by both stays so.
+#[inline(always)]
+fn multiply(weights: &mut [f32; ARITY], averages: &[f32; ARITY]) {
+    for (weight, average) in weights.iter_mut().zip(averages) {
+        // In range, a weight times the least average is not zero.
+        let possible = *weight > 0.0 && *average > 0.0;
+        *weight = only_if(possible, within_range(*weight) * average);
+    }
+    keep_positive(weights);
 }
 
 #[inline(always)]

@@ -43,7 +43,8 @@ fn estimates_are_those_of_single_cones_and_zero_proves_black() {
                 nearest[i] = lookup.nearest(point, VectorLookup::texels_of(cone.solid_angle));
                 covering[i] = lookup.covering(point, cone.sin_radius);
             }
-            let radiances = lookup.relative_radiances(&nearest, &covering);
+            let mut radiances = [0.0; 8];
+            lookup.relative_radiances(&nearest, &covering, &mut radiances);
             for (cone, radiance) in cones.iter().zip(radiances) {
                 assert!(radiance.is_finite() && radiance >= 0.0);
                 let alone = view.estimate_radiance(cone).value;
@@ -76,7 +77,9 @@ fn any_direction_has_an_estimate() {
             let point = direction_to_square(direction.to_array(), direction.length());
             let nearest = lookup.nearest(point, VectorLookup::texels_of(x));
             let covering = lookup.covering(point, other);
-            let [radiance] = lookup.relative_radiances(&[nearest], &[covering]);
+            let mut radiances = [0.0];
+            lookup.relative_radiances(&[nearest], &[covering], &mut radiances);
+            let [radiance] = radiances;
             assert!(radiance >= 0.0 && radiance.is_finite(), "{x} {other}: {radiance}");
         }
     }

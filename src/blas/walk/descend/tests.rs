@@ -28,15 +28,15 @@ impl CellTarget for Halved {
         child_corners(cell, index)
     }
 
-    fn weigh_children(&self, _at: LatticeCell, cell: &[Vec3; 3], _averages: &[f32; ARITY]) -> [f32; ARITY] {
-        core::array::from_fn(|index| {
+    fn weigh_children(&self, _at: LatticeCell, cell: &[Vec3; 3], _averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
+        *weights = core::array::from_fn(|index| {
             let child = child_corners(cell, index);
             if child.iter().all(|v| v.x < 0.1) {
                 0.0
             } else {
                 1.0 / child.iter().copied().sum::<Vec3>().length_squared()
             }
-        })
+        });
     }
 
     fn is_final(&self, at: LatticeCell, _cell: &mut [Vec3; 3], _levels: Option<u32>) -> bool {
@@ -82,7 +82,8 @@ fn masses(nodes: &[CellNode], root: Root, shape: &Halved) -> (f64, f64) {
                 }
             }
             (None, Some((_, pmf))) => {
-                assert!((pmf / mass - 1.0).abs() < 1e-12);
+                // Sums of groups are rounded to single precision.
+                assert!((pmf / mass - 1.0).abs() < 1e-5);
                 leaves += mass;
             }
             (None, None) => dead += mass,
@@ -149,8 +150,8 @@ fn stratified_input_stays_stratified() {
 
         fn child(&self, (): &(), _index: usize) {}
 
-        fn weigh_children(&self, _at: LatticeCell, (): &(), _averages: &[f32; ARITY]) -> [f32; ARITY] {
-            [1.0; ARITY]
+        fn weigh_children(&self, _at: LatticeCell, (): &(), _averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
+            *weights = [1.0; ARITY];
         }
 
         fn is_final(&self, at: LatticeCell, (): &mut (), _levels: Option<u32>) -> bool {
