@@ -13,6 +13,12 @@ use crate::parallel;
 /// A budget of time: no result depends on it.
 const WORTHWHILE_CELLS: usize = 256;
 
+/// Relative variance of sampling inside a cell from which dividing it is worth memory beyond the usual.
+///
+/// *Measured* on grid-10000 with a clip map of 400² texels, whose cells have 3, and on noise, whose cells have less than
+/// 1. Larger: sharp edges are left to noise. Smaller: noise takes twice the memory for little.
+const WORTHWHILE_VARIANCE: f64 = 1.5;
+
 /// The weights over a triangle.
 pub(crate) trait WeightSource: Sync {
     /// What may be wrong with them.
@@ -32,6 +38,8 @@ pub(crate) trait WeightSource: Sync {
 pub(crate) struct GrowthLimits {
     /// Most nodes; one at least.
     pub(crate) nodes: usize,
+    /// How many more there may be below cells that are not fine, in which sampling would be as bad as [`WORTHWHILE_VARIANCE`] says.
+    pub(crate) worthwhile: usize,
     /// From this level on, cells are fine: there must be a reason to divide them.
     pub(crate) fine: u32,
     /// Cells of this level are not divided.
@@ -92,7 +100,9 @@ pub(crate) fn grow<S: WeightSource>(
     let mut open = alloc::vec![OpenCell { cell: LatticeCell::whole(), range, at: 0 }];
     let (mut nodes, mut level, mut share) = (0, 0, 1.0);
     while !open.is_empty() {
-        let room = if level == limits.deepest { 0 } else { limits.nodes - nodes };
+        let is_deepest = level == limits.deepest;
+        let room = [limits.nodes, limits.nodes + limits.worthwhile]
+            .map(|most| if is_deepest { 0 } else { most.saturating_sub(nodes) });
         let spare = (level >= limits.fine).then_some(limits.variance);
         open = growing.choose(open, room, spare, share)?;
         nodes += open.len();
@@ -126,7 +136,7 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
     fn choose(
         &mut self,
         open: Vec<OpenCell>,
-        room: usize,
+        [room, worthwhile_room]: [usize; 2],
         spare: Option<f64>,
         share: f64,
     ) -> Result<Vec<OpenCell>, S::Fault> {
@@ -145,8 +155,11 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
         };
         let spared = ranks.iter().rev().take_while(enough).count();
         let mut is_kept = alloc::vec![false; open.len()];
-        for &(_, i) in ranks[..ranks.len() - spared].iter().take(room) {
-            is_kept[i] = true;
+        let mut kept = 0;
+        for (rank, &(variance, i)) in ranks[..ranks.len() - spared].iter().enumerate() {
+            let is_worthwhile = spare.is_none() && variance >= WORTHWHILE_VARIANCE * f64::from(measured[i].average);
+            is_kept[i] = rank < room || is_worthwhile && kept < worthwhile_room;
+            kept += usize::from(is_kept[i]);
         }
         for ((open, measured), _) in open.iter().zip(&measured).zip(&is_kept).filter(|(_, is_kept)| !**is_kept) {
             self.set(open.at, measured.average, share);

@@ -27,6 +27,8 @@ pub(crate) struct TexturePyramid<'a> {
     levels: Vec<PyramidLevel>,
     /// Bytes that trees over this image may still take beyond two a texel.
     pub(super) extra: f64,
+    /// Bytes that triangles so far have left of what they could have taken: later ones may have them.
+    pub(super) saved: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -38,7 +40,7 @@ struct PyramidLevel {
 impl<'a> TexturePyramid<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
-        let mut pyramid = Self { texture, levels: Vec::new(), extra: BYTES_PER_IMAGE };
+        let mut pyramid = Self { texture, levels: Vec::new(), extra: BYTES_PER_IMAGE, saved: 0.0 };
         let mut size = texture.size();
         while size != [1, 1] {
             let below = pyramid.levels.len() as u32;

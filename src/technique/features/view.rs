@@ -15,7 +15,7 @@ use crate::warp::Variate;
 /// Measured on star and grid-100 (docs/ACCURACY.md, "Suns taken out"). Larger: fewer parts, so that a shading point is
 /// cheaper, but the texture inside a part is followed by the tree's descent alone. Smaller: more parts, up to the limit of
 /// the list.
-const SMALL_CELL: f32 = 0.5;
+const SMALL_CELL: f32 = 4.0;
 
 /// Rounding of a cell's corners relative to the largest coordinate of a vertex. Proved: a corner is a sum of three
 /// products, each off by less than 2e-7; the rest is for the axis and the products with it.

@@ -26,9 +26,9 @@ fn golden() {
     assert_eq!(
         (roots, pool.len(), hash(bytes)),
         (
-            [Root { average: 0.491_266_88, node: 0 }, Root { average: 1.463_274_1, node: 240 }],
-            121,
-            16_491_244_605_129_993_337
+            [Root { average: 0.491_266_88, node: 0 }, Root { average: 1.463_274_1, node: 65 }],
+            261,
+            10_001_550_631_721_866_294
         )
     );
 }
