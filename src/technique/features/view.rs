@@ -87,10 +87,17 @@ impl<'a> FeatureView<'a> {
         if opening.coverage(self.bright()) == Coverage::Nothing {
             return;
         }
-        if below.node == LEAF || self.is_small(&corners) {
+        if below.node == LEAF {
             let power = opening.power(self.environment, self.feature);
             if power * below.average > 0.0 {
                 found(FeaturePart { cell, node: below.node, power }, power * below.average);
+            }
+            return;
+        }
+        if self.is_small(&corners) {
+            let through = scale * self.power_through(cell, below.node);
+            if through > 0.0 {
+                found(FeaturePart { cell, node: below.node, power: 0.0 }, through);
             }
             return;
         }
@@ -99,6 +106,15 @@ impl<'a> FeatureView<'a> {
             let root = Root { average: average * scale, node: blas::below(self.triangle.cells, below.node, i) };
             self.visit_below((cell.child(i), blas::child_corners(&corners, i)), root, scale, found);
         }
+    }
+
+    /// Power of the feature through a cell, relative to what a texture of the relative average one would let through: as if
+    /// the textures of its children were constant.
+    fn power_through(&self, cell: LatticeCell, node: u32) -> f32 {
+        let averages = blas::averages(self.triangle.cells, node);
+        let mut powers = [0.0; ARITY];
+        self.weigh_children(cell, &(), &averages, &mut powers);
+        averages.iter().zip(&powers).map(|(average, power)| average * power).sum()
     }
 
     /// Draws a point in a part.
