@@ -6,7 +6,7 @@
 use core::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion};
-use fanlight::{LightSampler, LightSamplerBuilder, Mesh, MeshUpdate, Weight};
+use fanlight::{LightSampler, LightSamplerBuilder, Mesh, MeshId, MeshUpdate, Weight};
 use glam::Vec3;
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
@@ -65,7 +65,8 @@ fn rows(criterion: &mut Criterion, name: &str, threads: usize) {
             pool.install(|| b.iter_batched(|| cloud.builder(), build, BatchSize::PerIteration));
         });
         let mut lights = build(cloud.builder());
-        let moved = |mesh: usize| MeshUpdate::new(mesh as u32).moved(&cloud.vertices[mesh], &[[0, 1, 2]]);
+        let moved =
+            |mesh: usize| MeshUpdate::new(MeshId::from_index(mesh as u32)).moved(&cloud.vertices[mesh], &[[0, 1, 2]]);
         let updates: Vec<_> = (0..n).map(moved).collect();
         group.bench_function(BenchmarkId::new("refit", n), |b| {
             pool.install(|| b.iter(|| refit(&mut lights, &updates)));

@@ -9,10 +9,8 @@ mod instruction_set;
 use core::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use fanlight::{
-    Environment, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight, sphere_to_square, square_to_sphere,
-};
-use glam::{DVec3, Vec2, Vec3};
+use fanlight::{Environment, EnvironmentImage, Filter, Hit, LightSampler, Mesh, ShadingPoint, Weight};
+use glam::{DVec3, Vec3};
 use rand_pcg::rand_core::Rng;
 
 /// Shading points, and vectors of random numbers, that are gone through in a circle.
@@ -154,7 +152,8 @@ fn environment(criterion: &mut Criterion) {
         if direction.dot(sun) > 0.5_f32.to_radians().cos() { 20_000.0 } else { 0.2 + 0.8 * cos.max(0.0) }
     };
     let sky: Vec<f32> = (0..2048 * SIZE).map(texel).collect();
-    let sky = Environment::from_lat_long_with_size(2048, SIZE, &sky, Filter::Nearest, SIZE).expect("a valid sky");
+    let image = EnvironmentImage::lat_long(2048, SIZE, &sky).filter(Filter::Nearest).resolution(SIZE);
+    let sky = Environment::new(&image).expect("a valid sky");
     let numbers = numbers();
     let mut pcg = Pcg::new(4, 4);
     let directions: Vec<Vec3> = (0..POINTS).map(|_| pcg.direction()).collect();
@@ -162,21 +161,6 @@ fn environment(criterion: &mut Criterion) {
     group.bench_function("radiance", |b| in_circle(b, POINTS, |i| sky.radiance(directions[i])));
     group.bench_function("pdf", |b| in_circle(b, POINTS, |i| sky.pdf(directions[i])));
     group.bench_function("sample", |b| in_circle(b, POINTS, |i| sky.sample([numbers[i][0], numbers[i][1]])));
-    group.finish();
-
-    let squares: Vec<Vec2> = numbers.iter().map(|u| Vec2::new(u[0], u[1])).collect();
-    let mut group = criterion.benchmark_group("map");
-    group.bench_function("to sphere", |b| in_circle(b, POINTS, |i| square_to_sphere(squares[i])));
-    group.bench_function("to square", |b| in_circle(b, POINTS, |i| sphere_to_square(directions[i])));
-    group.finish();
-
-    let view = sky.as_view();
-    let mut group = criterion.benchmark_group("pyramid");
-    for sin_radius in [0.001, 0.03, 0.5] {
-        group.bench_function(BenchmarkId::new("look-up of a cone", sin_radius), |b| {
-            in_circle(b, POINTS, |i| view.radiance_of_cone(directions[i], sin_radius));
-        });
-    }
     group.finish();
 }
 

@@ -18,12 +18,10 @@ fn main() -> Result<(), Error> {
     // The window: two triangles, with a texture of two by two texels.
     let uvs = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from);
     let positions = uvs.map(|uv| window(uv.x, uv.y));
-    let mut builder = LightSampler::builder();
-    builder.environment(Environment::constant(SKY)?);
+    let mut builder = LightSampler::builder().environment(Environment::constant(SKY)?);
     let panes = builder.add_texture(Texture::new(2, 2, &PANES)?.filter(Filter::Nearest));
     let mesh = Mesh::portal(&positions, &[[0, 1, 2], [0, 2, 3]]).uvs(&uvs).weight(Weight::Texture(panes));
-    builder.add_mesh(&mesh)?;
-    let lights = builder.build()?;
+    let lights = builder.mesh(&mesh)?.build()?;
 
     // A point on the floor, and directions from it through the window.
     let floor = ShadingPoint::surface(Vec3::new(0.3, -1.5, 0.0), Vec3::Z);

@@ -1,4 +1,4 @@
-//! What a light tree knows of a cluster of lights.
+//! Bounds and moments of a cluster of lights.
 
 use core::f32::consts::{FRAC_PI_2, PI};
 
@@ -23,11 +23,11 @@ pub(crate) struct LightBounds {
 }
 
 impl LightBounds {
-    /// Of no light.
+    /// Bounds of no light.
     pub(crate) const NONE: Self =
         Self { aabb: Aabb::EMPTY, normals: Cone::single(Vec3::Z), flux: 0.0, portal: 0.0, two_sided: false };
 
-    /// Bounds of both clusters together.
+    /// Returns the bounds of both clusters together.
     pub(crate) fn union(self, mut other: Self) -> Self {
         // The sign of a two-sided light's normal says nothing, so it is free to agree.
         if self.two_sided && other.two_sided && self.normals.axis.dot(other.normals.axis) < 0.0 {
@@ -42,21 +42,21 @@ impl LightBounds {
         }
     }
 
-    /// All that the cluster sends.
+    /// Returns all energy that the cluster sends.
     pub(crate) fn energy(&self) -> f32 {
         self.flux + self.portal
     }
 
-    /// What a cluster costs in the surface area orientation heuristic: `M_A · M_Ω · energy`.
+    /// Returns the cost of the cluster in the surface area orientation heuristic: `M_A · M_Ω · energy`.
     pub(crate) fn cost(&self) -> f64 {
         let (_, cos) = math::sin_cos(self.normals.theta);
         f64::from(self.aabb.area()) * f64::from(orientation_measure(cos, self.two_sided) * self.energy())
     }
 }
 
-/// The directions that lights may send into whose normals are within an angle with this cosine of an axis, as a solid
-/// angle weighted by the falloff at its rim: `M_Ω` of the surface area orientation heuristic (Conty Estevez and Kulla
-/// 2018, section 4.1) for θe = π/2, where its arcs go away but for one. That one is approximated to within 7e-5
+/// Returns the solid angle, weighted by the falloff at its rim, of the directions that lights may send into whose normals
+/// are within an angle with this cosine of an axis: `M_Ω` of the surface area orientation heuristic (Conty Estevez and Kulla
+/// 2018, section 4.1) for θe = π/2, where all of its arccosines but one cancel. That one is approximated to within 7e-5
 /// radians (Abramowitz and Stegun 1964, 4.4.45).
 #[inline]
 pub(crate) fn orientation_measure(cos: f32, two_sided: bool) -> f32 {
@@ -72,10 +72,10 @@ pub(crate) fn orientation_measure(cos: f32, two_sided: bool) -> f32 {
     if two_sided { (2.0 * one_side).min(4.0 * PI) } else { one_side }
 }
 
-/// How the energy of a cluster is spread: what a light tree estimates irradiance from.
+/// First and second moments of the energy of a cluster, from which a light tree estimates irradiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Moments {
-    /// All that the cluster sends.
+    /// Energy that the cluster sends.
     pub(crate) energy: f32,
     /// Mean position, by energy.
     pub(crate) mean: Vec3,
@@ -86,10 +86,10 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    /// Of no light.
+    /// Moments of no light.
     pub(crate) const NONE: Self = Self { energy: 0.0, mean: Vec3::ZERO, variance: 0.0, normal: Vec3::Z };
 
-    /// Moments of both clusters together. `flip` turns the normals of the second around first.
+    /// Returns the moments of both clusters together. `flip` reverses the normals of the second first.
     pub(crate) fn union(self, other: Self, flip: bool) -> Self {
         let energy = self.energy + other.energy;
         let share = if energy > 0.0 { other.energy / energy } else { 0.5 };

@@ -92,14 +92,13 @@ fn measured(mut call: impl FnMut(usize)) {
 }
 
 fn lights(scene: &Scene) -> LightSampler {
-    let mut builder = LightSamplerBuilder::new();
-    add(&mut builder, scene);
-    builder.build().expect("the workload is small")
+    builder(scene).build().expect("the workload is small")
 }
 
-fn add<'a>(builder: &mut LightSamplerBuilder<'a>, scene: &'a Scene) {
+fn builder(scene: &Scene) -> LightSamplerBuilder<'_> {
+    let mut builder = LightSampler::builder();
     if let Some(sky) = &scene.sky {
-        builder.environment(sky.environment.clone());
+        builder = builder.environment(sky.environment.clone());
     }
     let texture = scene.image.as_ref().map(|image| {
         let texture = Texture::new(image.size, image.size, &image.texels).expect("the image is finite");
@@ -118,6 +117,7 @@ fn add<'a>(builder: &mut LightSamplerBuilder<'a>, scene: &'a Scene) {
         };
         builder.add_mesh(&make.uvs(&mesh.uvs).weight(weight)).expect("the workload is valid");
     }
+    builder
 }
 
 fn numbers() -> Vec<[f32; 3]> {
@@ -152,10 +152,10 @@ fn of_samples(workload: &str, density: fn(&LightSampler, &ShadingPoint, &LightSa
 fn sample_split() {
     let scene = scenes::scene("cloud-10000");
     let (lights, points, numbers) = (lights(&scene), scene.points.timing(CALLS), numbers());
-    let splitting = Splitting { threshold: 0.9, levels: 1 };
+    let splitting = Splitting::new(0.9, 1);
     measured(|i| {
         let mut samples = SmallVec::<[LightSample; 16]>::new();
-        lights.sample_split(&points[i], numbers[i], &splitting, &mut samples);
+        lights.at(&points[i]).sample_split(numbers[i], &splitting, &mut samples);
         black_box(samples);
     });
 }
@@ -195,8 +195,7 @@ fn at() {
 
 fn build() {
     let scene = scenes::scene("cloud-10000");
-    let mut builder = Some(LightSamplerBuilder::<16>::new());
-    builder.iter_mut().for_each(|builder| add(builder, &scene));
+    let mut builder = Some(builder(&scene));
     measured(|_| {
         if let Some(builder) = builder.take() {
             black_box(builder.build().expect("the workload is small"));

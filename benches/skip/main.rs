@@ -38,14 +38,14 @@ struct Saving {
 
 impl Side {
     fn bytes(&self) -> usize {
-        self.lights.as_view().bytes().iter().sum()
+        self.lights.bytes().total()
     }
 
     /// Nanoseconds a sample.
     fn time(&self, samples: usize, numbers: &[[f32; 3]]) -> f64 {
         let start = Instant::now();
         for i in 0..samples {
-            black_box(self.lights.sample(&self.points[i % self.points.len()], numbers[i % numbers.len()]));
+            black_box(self.lights.at(&self.points[i % self.points.len()]).sample(numbers[i % numbers.len()]));
         }
         start.elapsed().as_secs_f64() * 1e9 / samples as f64
     }
@@ -158,8 +158,7 @@ fn half(texels: &[f32]) -> Environment {
 /// Windows of 1 x 1 m next to each other in the wall y = 0. The texture coordinates of each differ from those of the
 /// one before by `step`.
 fn quad(portal: bool, environment: Environment, texels: Option<&[f32]>, count: u16, step: f32) -> LightSampler {
-    let mut builder = LightSampler::builder();
-    builder.environment(environment);
+    let mut builder = LightSampler::builder().environment(environment);
     let weight = texels.map_or(Weight::Constant(1.0), |texels| {
         Weight::Texture(builder.add_texture(Texture::new(SIZE, SIZE, texels).expect("the texels are finite")))
     });
@@ -177,8 +176,7 @@ fn quad(portal: bool, environment: Environment, texels: Option<&[f32]>, count: u
 
 fn triangle() -> LightSampler {
     let positions = [[-0.5, 0.0, 1.0], [0.5, 0.0, 1.0], [0.0, 0.0, 2.0]].map(Vec3::from);
-    let mut builder = LightSampler::builder();
-    builder.add_mesh(&Mesh::emitter(&positions, &[[0, 1, 2]])).expect("a valid triangle");
+    let builder = LightSampler::builder().mesh(&Mesh::emitter(&positions, &[[0, 1, 2]])).expect("a valid triangle");
     builder.build().expect("one triangle")
 }
 

@@ -134,24 +134,24 @@ impl EnvironmentView<'_> {
         RadianceBounds { mean: (sum / count).clamp(min, max), min, max }
     }
 
-    /// Returns the least and the largest radiance of the texels, 2x2 at most, that a box around a point touches.
-    #[inline(always)]
-    pub(super) fn range_of_box(&self, [x, y]: [f32; 2], half_side: f32) -> [f32; 2] {
-        let depth = self.depth_of_side(2.0 * half_side);
+    /// Returns the range over texels that hold the box of this half side around a point of the square.
+    #[inline]
+    pub(super) fn range_of_box(&self, x: f32, y: f32, half: f32) -> [f32; 2] {
+        let depth = self.depth_of_side(2.0 * half);
         if depth == 0 {
             return self.ranges[0];
         }
         let size = 1_i32 << depth;
-        let scale = size as f32;
-        let texel = |coordinate: f32| ((coordinate + 1.0) * scale) as i32 - size;
-        let [x0, x1, y0, y1] = [x - half_side, x + half_side, y - half_side, y + half_side].map(texel);
-        let mut range = [f32::INFINITY, 0.0_f32];
+        // As in `radiance_bounds`.
+        let texel = |coordinate: f32| ((coordinate + 1.0) * size as f32) as i32 - size;
+        let (x0, x1, y0, y1) = (texel(x - half), texel(x + half), texel(y - half), texel(y + half));
+        let (mut min, mut max) = (f32::INFINITY, 0.0_f32);
         for (i, j) in [(x0, y0), (x1, y0), (x0, y1), (x1, y1)] {
             let (i, j) = wrap_texel_log2(i, j, depth);
             let [low, high] = self.range_at(depth, i, j);
-            range = [range[0].min(low), range[1].max(high)];
+            (min, max) = (min.min(low), max.max(high));
         }
-        range
+        [min, max]
     }
 
     /// Depth of the finest level whose texels are at least as wide as `side`, so that it touches 2x2 at most.

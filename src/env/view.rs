@@ -1,7 +1,7 @@
 //! The borrowed form of an environment: all lookups.
 
 use super::feature_texel::FeatureTexel;
-use super::features::BrightFeature;
+use super::feature_tree::FeatureNode;
 use super::pyramid::level_start;
 use super::rotation::to_local;
 use crate::buffers::buffers;
@@ -23,8 +23,8 @@ pub(crate) struct EnvironmentHeader {
     pub(crate) max: f32,
     /// Number of negative texels of the input, all clamped to zero.
     pub(crate) clamped_texels: u32,
-    /// Radiance at which texels are capped in `ranges` and `filtered`: what is above it is in the bright
-    /// features. Infinite without features.
+    /// Least radiance at which texels are capped anywhere in `ranges` and `filtered`: what is above is in the bright
+    /// features, which say where they cap. Infinite without features.
     pub(crate) cap: f32,
 }
 
@@ -59,10 +59,10 @@ buffers! {
         ranges: [f32; 2] = b"ERAN" version 1,
         /// 3x3 box-filtered means of all levels of the capped image, laid out like `means`.
         filtered: f32 = b"EFIL" version 1,
-        /// Clusters of texels above the cap.
-        features: BrightFeature = b"EFEA" version 1,
-        /// Texels of all features.
-        feature_texels: FeatureTexel = b"ETEX" version 1,
+        /// Tree over the texels above the cap.
+        features: FeatureNode = b"EFEA" version 2,
+        /// Texels of all features, in blocks.
+        feature_texels: FeatureTexel = b"ETEX" version 2,
     }
 }
 
@@ -145,7 +145,7 @@ impl EnvironmentView<'_> {
     #[inline]
     pub(super) fn range_at(&self, depth: u32, x: u32, y: u32) -> [f32; 2] {
         if depth == self.header.depth {
-            [self.mean_at(depth, x, y).min(self.header.cap); 2]
+            [self.rest_of(x, y, self.mean_at(depth, x, y)); 2]
         } else {
             self.ranges[level_start(depth) + ((y << depth) | x) as usize]
         }

@@ -10,11 +10,11 @@ use glam::Vec3;
 use super::illumination::{CellView, Illumination, SOFTENING};
 use super::triangle_view::TriangleView;
 use crate::blas::{self, ARITY, CHILD_CENTERS, CellTarget, Guide, LatticeCell};
-use crate::env::{EnvironmentView, VectorLookup, direction_to_square};
-use crate::math::{at_least, only_if, sqrt};
+use crate::env::EnvironmentView;
+use crate::math::{at_least, sqrt};
 use crate::receiver::{HeightWeights, ReceiverKind};
 use crate::simd::Kernel;
-use crate::warp::equal_area::SPHERE;
+use crate::warp::equal_area::sphere_to_square_quickly;
 
 /// Ratio of squared radius to squared distance up to which the geometry is taken to be constant over a cell.
 ///
@@ -31,12 +31,6 @@ const CONSTANT_COSINE: f32 = 0.5;
 ///
 /// Measured (docs/ACCURACY.md, "Even cosine"). A smaller value divides cells that hardly contribute.
 const LOW_COSINE: f32 = 1.0 / 16.0;
-
-/// Solid angle of a cell in texels of the environment up to which what is seen behind it is not followed further.
-///
-/// Measured on the window (docs/ACCURACY.md, "Wide steps"). Larger: more of the contrast between texels is left to noise.
-/// Smaller: time for steps within texels.
-const FINAL_TEXELS: f32 = 4.0;
 
 /// Levels below the texture at which a descent ends whatever is left: one more does not change the variance by a
 /// hundredth where the texture is constant. Below a texture the cells are smaller.
@@ -65,13 +59,6 @@ pub(super) struct SpatialCell {
     has_constant_radiance: bool,
 }
 
-/// What is seen behind a portal.
-#[derive(Clone, Copy)]
-struct Background<'a> {
-    environment: &'a EnvironmentView<'a>,
-    lookup: VectorLookup<'a>,
-}
-
 /// The target that the cells of a triangle are chosen by.
 pub(super) struct CellKernel<'a> {
     view: &'a TriangleView<'a>,
@@ -79,7 +66,10 @@ pub(super) struct CellKernel<'a> {
     horizon: f32,
     /// Least squared distance of any point.
     least_distance2: f32,
-    background: Option<Background<'a>>,
+    /// What is seen behind a portal.
+    environment: Option<&'a EnvironmentView<'a>>,
+    /// Whether what is seen may be black or of great contrast.
+    is_rough: bool,
 }
 
 /// A descent from a triangle to a cell.
@@ -100,14 +90,13 @@ impl<G: Guide> Kernel for CellDescent<'_, G> {
 impl<'a> CellKernel<'a> {
     #[inline(always)]
     fn new(view: &'a TriangleView<'a>) -> Self {
-        let background =
-            view.environment.map(|environment| Background { environment, lookup: environment.vector_lookup() });
         Self {
             view,
             weights: view.receiver.height_weights(),
             horizon: view.cell_horizon(),
             least_distance2: at_least(view.height * view.height, f32::MIN_POSITIVE),
-            background,
+            environment: view.environment,
+            is_rough: view.environment.is_some_and(EnvironmentView::is_rough),
         }
     }
 
@@ -132,13 +121,13 @@ impl<'a> CellKernel<'a> {
         let area_by_height = area * self.view.height;
         let scale = area_by_height * FRAC_1_PI;
         let softening = SOFTENING * area;
-        let texels = VectorLookup::texels_of(area_by_height);
+        let texels = EnvironmentView::filter_texels(area_by_height);
+        let finest = self.environment.map_or(1.0, |environment| environment.size() as f32);
         let radius = if COVERING { sqrt(self.view.radius2 * share) + CENTER_ROUNDING * self.extent() } else { 0.0 };
         // Everything that the loop needs is a local value: what is behind a reference might be what the loop writes.
         let (receiver, horizon, least_distance2) = (self.weights, self.horizon, self.least_distance2);
         let (v0, e1, e2) = (v0.to_array(), e1.to_array(), e2.to_array());
-        let lookup = self.background.map(|background| background.lookup);
-        let (mut nearest, mut covering) = ([0; ARITY], [0; ARITY]);
+        let (mut fine, mut cover) = ([0; ARITY], [0; ARITY]);
         for i in 0..ARITY {
             let (b1, b2, turn) = (CHILD_CENTERS.b1[i], CHILD_CENTERS.b2[i], CHILD_CENTERS.scale[i]);
             let [x, y, z] = [0, 1, 2].map(|k| v0[k] + (e1[k] * b1 + e2[k] * b2));
@@ -152,25 +141,23 @@ impl<'a> CellKernel<'a> {
             let highest = at_least(at_least(heights[0], heights[1]), heights[2]);
             weights[i] = if highest < horizon { 0.0 } else { weight };
             if LOOKUP {
-                if let Some(lookup) = lookup {
-                    let point = direction_to_square([x, y, z], distance);
-                    nearest[i] = lookup.nearest(point, texels * (distance2 * distance));
-                    if COVERING {
-                        covering[i] = lookup.covering(point, radius / distance);
-                    }
+                let inverse = 1.0 / distance;
+                let point = sphere_to_square_quickly([x * inverse, y * inverse, z * inverse]);
+                let size = EnvironmentView::filter_size_of_lane(texels * (distance2 * distance), finest);
+                fine[i] = EnvironmentView::texel_in_level(point, size);
+                if COVERING {
+                    // asin(s) <= s + (π/2 - 1) s³, as its series has no other signs. From 1 on the size is 1 anyway.
+                    let sine = radius * inverse;
+                    let angle = sine + 0.570_8 * (sine * sine * sine);
+                    cover[i] = EnvironmentView::texel_in_level(point, EnvironmentView::cover_size(angle, finest));
                 }
             }
         }
         if self.view.illumination != Illumination::ClampedVertices {
             self.estimate_one_by_one(at, averages, weights);
         }
-        if let Some(lookup) = lookup.filter(|_| LOOKUP) {
-            let mut radiances = [0.0; ARITY];
-            lookup.relative_radiances(&nearest, &covering, &mut radiances);
-            for (weight, radiance) in weights.iter_mut().zip(radiances) {
-                let product = at_least(*weight * radiance, LEAST_WEIGHT);
-                *weight = only_if(*weight > 0.0 && radiance > 0.0, product);
-            }
+        if let Some(environment) = self.environment.filter(|_| LOOKUP) {
+            environment.weigh_lanes(&fine, COVERING.then_some(&cover), weights);
         }
     }
 
@@ -212,13 +199,13 @@ impl CellTarget for CellKernel<'_> {
     fn whole(&self) -> SpatialCell {
         let vertices = self.view.vertices;
         SpatialCell {
-            corners: match &self.background {
-                Some(background) => vertices.map(|vertex| background.environment.local_direction(vertex)),
+            corners: match self.environment {
+                Some(environment) => vertices.map(|vertex| environment.local_direction(vertex)),
                 None => vertices,
             },
             // Not in another frame: the horizon leaves no room for the rounding of a rotation.
             heights: vertices.map(|vertex| self.view.receiver_normal.dot(vertex)),
-            has_constant_radiance: self.background.is_none(),
+            has_constant_radiance: self.environment.is_none(),
         }
     }
 
@@ -233,15 +220,10 @@ impl CellTarget for CellKernel<'_> {
 
     #[inline(always)]
     fn weigh_children(&self, at: LatticeCell, cell: &SpatialCell, averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
-        match &self.background {
-            Some(background) if !cell.has_constant_radiance => {
-                if background.lookup.needs_covering {
-                    self.weigh::<true, true>(at, cell, averages, weights)
-                } else {
-                    self.weigh::<true, false>(at, cell, averages, weights)
-                }
-            }
-            _ => self.weigh::<false, false>(at, cell, averages, weights),
+        match (cell.has_constant_radiance, self.is_rough) {
+            (true, _) => self.weigh::<false, false>(at, cell, averages, weights),
+            (false, false) => self.weigh::<true, false>(at, cell, averages, weights),
+            (false, true) => self.weigh::<true, true>(at, cell, averages, weights),
         }
     }
 
@@ -258,14 +240,11 @@ impl CellTarget for CellKernel<'_> {
         let center = (a + b + c) * (1.0 / 3.0);
         let distance2 = at_least(center.length_squared(), self.least_distance2);
         let share = at.area();
-        if let Some(background) = self.background.as_ref().filter(|_| !cell.has_constant_radiance) {
-            let distance = sqrt(distance2);
-            let solid_angle = self.view.area * share * self.view.height / (distance2 * distance);
-            let is_fine = solid_angle <= FINAL_TEXELS * background.environment.texel_solid_angle();
-            cell.has_constant_radiance = is_fine || {
-                let half_side = 0.5 * sqrt(solid_angle * (1.0 / SPHERE));
-                background.environment.is_about_constant(direction_to_square(center.to_array(), distance), half_side)
-            };
+        if let Some(environment) = self.environment.filter(|_| !cell.has_constant_radiance) {
+            let inverse = 1.0 / sqrt(distance2);
+            let solid_angle = self.view.area * share * self.view.height * (inverse * inverse * inverse);
+            let point = sphere_to_square_quickly((center * inverse).to_array());
+            cell.has_constant_radiance = environment.is_about_constant(point, solid_angle);
         }
         cell.has_constant_radiance && self.has_constant_geometry(cell, share, distance2)
     }
@@ -276,6 +255,13 @@ impl TriangleView<'_> {
     #[inline(always)]
     fn cell_horizon(&self) -> f32 {
         if self.receiver.has_horizon() { self.horizon } else { f32::NEG_INFINITY }
+    }
+
+    /// Whether points uniform by area are as good as any.
+    #[inline]
+    pub(super) fn is_about_constant(&self) -> bool {
+        let kernel = CellKernel::new(self);
+        kernel.is_final(LatticeCell::whole(), &mut kernel.whole(), Some(0))
     }
 
     /// Estimates the irradiance over π from a cell, as if it had a radiance of one. Zero only below the horizon.

@@ -4,12 +4,14 @@
 use glam::Vec3;
 
 use crate::geometry::HORIZON_ROUNDING;
+use crate::math::at_least;
 
-/// Least expected cosine at a surface of a cluster that is not culled.
+/// Least expected cosine of a cluster that is not culled, at the receiver and at the lights. It keeps every light possible
+/// that may be visible.
 ///
-/// Measured on cloud-10000 (docs/ACCURACY.md, "Tuned constants"). Larger values send samples to clusters at the horizon;
-/// smaller ones leave a cluster whose mean is below the horizon too few samples for what rises above it.
-pub(super) const LEAST_LANE_COSINE: f32 = 1e-3;
+/// *Measured* on cloud-10000 (docs/ACCURACY.md, "Moments"). A larger value wastes samples on clusters seen edge-on; a smaller
+/// one makes their samples rarer and brighter.
+pub(crate) const LEAST_CLUSTER_COSINE: f32 = 1e-3;
 
 /// A shading point prepared for the vector loop over the lanes of a node.
 pub(crate) struct ReceiverLanes {
@@ -40,5 +42,12 @@ impl ReceiverLanes {
     ) -> Self {
         let slack = HORIZON_ROUNDING * horizon.abs().element_sum();
         Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack }
+    }
+
+    /// Returns the mean weight of a small cell of directions by the cosine of its central direction to the normal. `least`
+    /// is that of [`ReceiverKind::least_over_directions`](super::ReceiverKind::least_over_directions).
+    #[inline(always)]
+    pub(crate) fn weight_of_cell(&self, cosine: f32, least: f32) -> f32 {
+        at_least(f32::from_bits(cosine.to_bits() & self.cosine_bits), least)
     }
 }

@@ -14,7 +14,7 @@ mod volume;
 use glam::Vec3;
 
 use crate::math::at_least;
-pub(crate) use lanes::ReceiverLanes;
+pub(crate) use lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use surface::Surface;
 use transmissive::Transmissive;
 use volume::Volume;
@@ -88,6 +88,12 @@ impl ShadingPoint {
     pub fn cosine(&self, direction: Vec3) -> f32 {
         self.receiver.weight(direction)
     }
+
+    /// Returns the point prepared for the loop over the lanes of a node.
+    #[inline(always)]
+    pub(crate) fn lanes(&self) -> ReceiverLanes {
+        self.receiver.lanes(self.position)
+    }
 }
 
 /// A normal of unit length, untouched if it has that length already.
@@ -141,6 +147,10 @@ pub(crate) trait ReceiverKind: Copy {
     /// Returns the irradiance over π from a triangle of unit radiance, exact as far as `f32` goes. The vertices are
     /// relative to the receiver.
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32;
+
+    /// Returns the least mean weight of a small cell of directions, of which the central one is weighed
+    /// ([`ReceiverLanes::weight_of_cell`]). It stands in for what the other directions of the cell weigh.
+    fn least_over_directions(self, solid_angle: f32) -> f32;
 
     /// Returns what the loop over the lanes of a node needs.
     fn lanes(self, position: Vec3) -> ReceiverLanes;
@@ -204,6 +214,11 @@ impl ReceiverKind for Receiver {
 
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
         dispatch!(self, kind => kind.irradiance(vertices))
+    }
+
+    #[inline(always)]
+    fn least_over_directions(self, solid_angle: f32) -> f32 {
+        dispatch!(self, kind => kind.least_over_directions(solid_angle))
     }
 
     #[inline(always)]

@@ -3,9 +3,15 @@
 use glam::Vec3;
 
 use super::lambert::lambert;
-use super::lanes::{LEAST_LANE_COSINE, ReceiverLanes};
+use super::lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use super::{HeightWeights, ReceiverKind};
 use crate::geometry::is_below;
+
+/// Least cosine that a cell of directions above the horizon is weighed by.
+///
+/// A guard against rounding: cells at the horizon have centers of about 1e-2. Larger values send samples to the horizon;
+/// smaller ones leave a cell too few where rounding has taken its center below.
+const LEAST_CELL_COSINE: f32 = 1e-4;
 
 #[derive(Clone, Copy)]
 pub(super) struct Surface {
@@ -54,9 +60,15 @@ impl ReceiverKind for Surface {
         lambert(self.normal, vertices)
     }
 
+    /// Cells of directions are cut off at the horizon, so that the cosine of the center is about the mean.
+    #[inline(always)]
+    fn least_over_directions(self, _solid_angle: f32) -> f32 {
+        LEAST_CELL_COSINE
+    }
+
     #[inline(always)]
     fn lanes(self, position: Vec3) -> ReceiverLanes {
         let normal = self.normal;
-        ReceiverLanes::new(position, normal, u32::MAX, LEAST_LANE_COSINE, normal, 0.0)
+        ReceiverLanes::new(position, normal, u32::MAX, LEAST_CLUSTER_COSINE, normal, 0.0)
     }
 }

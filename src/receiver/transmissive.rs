@@ -3,8 +3,9 @@
 use glam::Vec3;
 
 use super::lambert::lambert;
-use super::lanes::{LEAST_LANE_COSINE, ReceiverLanes};
+use super::lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use super::{HeightWeights, ReceiverKind};
+use crate::math;
 
 #[derive(Clone, Copy)]
 pub(super) struct Transmissive {
@@ -52,9 +53,15 @@ impl ReceiverKind for Transmissive {
         lambert(self.normal, vertices) + lambert(-self.normal, vertices)
     }
 
+    /// The mean of a square cell that the plane halves.
+    #[inline(always)]
+    fn least_over_directions(self, solid_angle: f32) -> f32 {
+        0.25 * math::sqrt(solid_angle)
+    }
+
     #[inline(always)]
     fn lanes(self, position: Vec3) -> ReceiverLanes {
         // All bits of the cosine but its sign: both sides receive.
-        ReceiverLanes::new(position, self.normal, u32::MAX >> 1, LEAST_LANE_COSINE, Vec3::ZERO, 1.0)
+        ReceiverLanes::new(position, self.normal, u32::MAX >> 1, LEAST_CLUSTER_COSINE, Vec3::ZERO, 1.0)
     }
 }

@@ -77,7 +77,7 @@ impl<'a> LightSamplerView<'a> {
             .ok_or_else(|| Error::bytes("arity of the tree over the lights", 0, light_arity, 16u64))?;
         let illumination =
             Illumination::from_u32(illumination).ok_or_else(|| Error::bytes("illumination", 0, illumination, 0u64))?;
-        if !(energy >= 0.0 && energy < f32::INFINITY) {
+        if !(0.0..f32::INFINITY).contains(&energy) {
             return Err(Error::bytes("energy", 0, energy.to_bits(), 0u64));
         }
         let tlas = TlasView::from_sections(&mut sections, arity)?;

@@ -9,7 +9,7 @@ use crate::light::LightKind;
 use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
 use crate::technique::{Variates, Viewpoint};
-use crate::tlas::{Descent, TURNS};
+use crate::tlas::{Descent, INTERLEAVED};
 use crate::warp::Variate;
 
 impl LightSamplerView<'_> {
@@ -23,17 +23,17 @@ impl LightSamplerView<'_> {
             let each = queries.iter().zip(samples);
             return each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));
         }
-        for (queries, samples) in queries.chunks(TURNS).zip(samples.chunks_mut(TURNS)) {
+        for (queries, samples) in queries.chunks(INTERLEAVED).zip(samples.chunks_mut(INTERLEAVED)) {
             self.sample_few(queries, samples);
         }
     }
 
     fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        let mut walks = SmallVec::<[Descent<Viewpoint<'_>>; TURNS]>::new();
-        let mut points = SmallVec::<[[Variate; 2]; TURNS]>::new();
+        let mut walks = SmallVec::<[Descent<Viewpoint<'_>>; INTERLEAVED]>::new();
+        let mut points = SmallVec::<[[Variate; 2]; INTERLEAVED]>::new();
         for (x, u) in queries {
             let Variates { choice, point } = Variates::new(*u);
-            walks.push(Descent::new(x, Viewpoint { scene: self.scene, x: *x }, choice));
+            walks.push(Descent::new(Viewpoint { scene: self.scene, x: *x }, choice));
             points.push(point);
         }
         self.scene.tlas.sample_many(&mut walks);

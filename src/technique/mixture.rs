@@ -2,7 +2,9 @@
 
 use super::features::VisibleFeatures;
 use super::trees::{self, Trees};
-use super::{Density, Technique, Variates, Viewpoint};
+use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
+use glam::DVec3;
+
 use crate::light::{LightPoint, LightView};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::{Variate, pick_pair};
@@ -28,8 +30,7 @@ const MAX_IRRADIANCE: f32 = 1e35;
 pub(crate) struct Mixture {
     /// Weights of the tree's first choice, where balancing the techniques has taken them.
     first: Option<FirstWeights>,
-    /// The features that are visible. `None` where there is none: a list would take longer to write than many a sample to
-    /// draw.
+    /// The features that are visible. `None` where there is none: moving a list takes longer than many a sample.
     features: Option<VisibleFeatures>,
     /// Estimate of the irradiance that the trees account for.
     rest: f32,
@@ -49,39 +50,51 @@ struct Shares {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drawn {
     pub(crate) point: LightPoint,
+    /// The same relative to the shading point.
+    pub(crate) relative: DVec3,
     /// Probability of the light by the trees, or the expected number of visits where the tree is split.
     pub(crate) pmf: f64,
     /// Per solid angle.
     pub(crate) pdf: f64,
 }
 
+impl Drawn {
+    #[inline(always)]
+    fn new(PlacedPoint { point, relative }: PlacedPoint, Density { pmf, pdf }: Density) -> Self {
+        Self { point, relative, pmf, pdf }
+    }
+}
+
 impl Mixture {
     /// Finds out what each technique accounts for at a shading point.
     #[inline(always)]
     pub(crate) fn new(at: &Viewpoint<'_>) -> Self {
-        let mut mixture = Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } };
-        if at.scene.has_features() {
-            mixture.balance(at);
-        }
-        mixture
+        if at.scene.has_features() { Self::balanced(at) } else { Self::of_trees() }
     }
 
-    /// Looks for features, and balances them with the trees.
+    /// The trees alone.
+    #[inline(always)]
+    fn of_trees() -> Self {
+        Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } }
+    }
+
+    /// Looks for features, and balances them with the trees. Returned as a whole, so that it is built in its place: it is
+    /// large, and most of it is seldom written.
     #[inline(never)]
-    fn balance(&mut self, at: &Viewpoint<'_>) {
-        let features = self.features.insert(VisibleFeatures::default());
+    fn balanced(at: &Viewpoint<'_>) -> Self {
+        let mut features = VisibleFeatures::default();
         features.find(at);
         let seen = features.irradiance();
         if !(seen > 0.0 && seen < MAX_IRRADIANCE) {
-            self.features = None;
-            return;
+            return Self::of_trees();
         }
         let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
-        self.first = at.scene.tlas.first_weights(&at.x, at);
-        let rest = trees::irradiance(at, self.first.as_ref());
-        self.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
-        let total = f64::from(seen) + f64::from(self.rest);
-        self.shares = Shares { trees: f64::from(self.rest) / total, features: 1.0 / total };
+        let first = at.scene.tlas.first_weights(at);
+        let rest = trees::irradiance(at, first.as_ref());
+        let rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
+        let total = f64::from(seen) + f64::from(rest);
+        let shares = Shares { trees: f64::from(rest) / total, features: 1.0 / total };
+        Self { first, features: Some(features), rest, shares }
     }
 
     /// Returns the mixture for single samples: one technique is chosen.
@@ -120,7 +133,9 @@ impl Mixed<'_> {
                 return self.sample_feature(at, u, then);
             }
         }
-        self.trees.sample(at, u, |point, trees, view| then(&self.complete(at, point, trees, view), view))
+        self.trees.sample(at, u, |point, trees, view| {
+            then(&Drawn::new(point, self.complete(at, point.point, trees, view)), view)
+        })
     }
 
     /// Draws a point on a light that the trees have chosen with this probability, or visit this many times.
@@ -132,7 +147,9 @@ impl Mixed<'_> {
         u: [Variate; 2],
         then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
-        self.trees.sample_on(at, leaf, pmf, u, |point, trees, view| then(&self.complete(at, point, trees, view), view))
+        self.trees.sample_on(at, leaf, pmf, u, |point, trees, view| {
+            then(&Drawn::new(point, self.complete(at, point.point, trees, view)), view)
+        })
     }
 
     /// Draws a point on a portal towards a feature, if any is visible.
@@ -145,8 +162,8 @@ impl Mixed<'_> {
     ) -> Option<R> {
         let features = self.mixture.features.as_ref()?;
         features.sample(at, u, |point, features, view| {
-            let trees = self.trees.density(at, point, view);
-            then(&self.mix(point, trees, features), view)
+            let trees = self.trees.density(at, point.point, view);
+            then(&Drawn::new(point, self.mix(trees, features)), view)
         })
     }
 
@@ -162,16 +179,16 @@ impl Mixed<'_> {
 
     /// Adds the density by the features to that by the trees.
     #[inline(always)]
-    fn complete(&self, at: &Viewpoint<'_>, point: LightPoint, trees: Density, view: &LightView<'_>) -> Drawn {
+    fn complete(&self, at: &Viewpoint<'_>, point: LightPoint, trees: Density, view: &LightView<'_>) -> Density {
         match &self.mixture.features {
-            None => self.mix(point, trees, Density { pmf: 0.0, pdf: 0.0 }),
-            Some(features) => self.mix(point, trees, features.density(at, point, view)),
+            None => self.mix(trees, Density { pmf: 0.0, pdf: 0.0 }),
+            Some(features) => self.mix(trees, features.density(at, point, view)),
         }
     }
 
     #[inline(always)]
-    fn mix(&self, point: LightPoint, trees: Density, features: Density) -> Drawn {
+    fn mix(&self, trees: Density, features: Density) -> Density {
         let pdf = self.shares.trees * trees.pdf + self.shares.features * features.pdf;
-        Drawn { point, pmf: trees.pmf * self.shares.trees, pdf }
+        Density { pmf: trees.pmf * self.shares.trees, pdf }
     }
 }

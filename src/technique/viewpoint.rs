@@ -24,7 +24,7 @@ impl<'a> LightScene<'a> {
     /// Whether bright features of the environment may be seen through portals.
     #[inline]
     pub(crate) fn has_features(&self) -> bool {
-        self.lights.has_portals && !self.environment.bright_features().is_empty()
+        self.lights.has_portals && !self.environment.feature_nodes().is_empty()
     }
 
     /// The environment, if what portals show depends on the direction.
@@ -66,6 +66,11 @@ impl Viewpoint<'_> {
 }
 
 impl LeafOracle for Viewpoint<'_> {
+    #[inline(always)]
+    fn shading_point(&self) -> &ShadingPoint {
+        &self.x
+    }
+
     #[inline(always)]
     fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
         let mean = self.scene.environment.mean_without_features();

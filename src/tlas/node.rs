@@ -3,17 +3,19 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Bit of [`Node::normals`] that marks a two-sided light.
-pub(super) const TWO_SIDED: u32 = 1 << 31;
-/// Largest component of a normal, in the ten bits that it has.
+/// Bit of [`Node::normals`] that marks a two-sided light. *Format.*
+pub(super) const LANE_TWO_SIDED: u32 = 1 << 31;
+/// Largest component of a normal, in the ten bits that it has. *Format.*
 pub(super) const NORMAL_STEPS: f32 = 511.0;
-/// Code of a cone of normals so wide that something always faces the shading point.
+/// Code of a cone of normals so wide that something always faces the shading point. *Format.*
 pub(super) const WIDE: u8 = u8::MAX;
-/// Largest code of a share.
+/// Largest code of a share, which stands for exactly one. *Format.*
 pub(super) const ALL: u8 = u8::MAX;
-/// Largest code of a mean position, at the side of the box.
+/// Largest code of a mean position, at the side of the box. *Format.*
 pub(super) const MEAN_STEPS: f32 = 127.0;
-/// Root of the tangent of a cone's half angle, in steps.
+/// Number of steps per unit of the square root of the tangent of a cone's half angle. The root makes the codes of narrow cones
+/// finer. *Format*: with 254 steps, tangents end at 15.8, which is above the tangent of
+/// `WIDEST_CONE`; smaller steps could not reach it, larger ones widen all cones.
 pub(super) const TANGENT_STEPS: f32 = 64.0;
 
 /// Up to `N` children, in few bits each (after Ylitie, Karras and Laine 2017): first other nodes, which are neighbours
@@ -31,7 +33,7 @@ pub(crate) struct Node<const N: usize> {
     /// The first child that is a leaf.
     pub(super) first_leaf: u32,
     /// Direction of the mean normal, which is the axis of the cone of normals as well: ten bits a component, and
-    /// [`TWO_SIDED`].
+    /// [`LANE_TWO_SIDED`].
     pub(super) normals: [u32; N],
     /// Energies; zero where there is no child.
     pub(super) energies: [u16; N],
@@ -41,7 +43,7 @@ pub(crate) struct Node<const N: usize> {
     pub(super) node_count: u8,
     /// Number of children.
     pub(super) width: u8,
-    /// Centres of the boxes, in steps from the origin.
+    /// Centers of the boxes, in steps from the origin.
     pub(super) centers: [[u8; N]; 3],
     /// Halves of the boxes' edges, in halves of a step.
     pub(super) halves: [[u8; N]; 3],
@@ -77,14 +79,14 @@ pub(crate) enum Child {
     Leaf(u32),
 }
 
-/// A number of two bytes.
+/// Returns the value of a number of two bytes.
 #[inline(always)]
 pub(super) fn wide(bits: u16) -> f32 {
     f32::from_bits(u32::from(bits) << 16)
 }
 
 impl<const N: usize> Node<N> {
-    /// A node whose children are known, but nothing of them.
+    /// Returns a node whose children are known, but without bounds.
     pub(super) fn new(first_node: usize, node_count: usize, first_leaf: usize, width: usize) -> Self {
         Self {
             first_node: first_node as u32,
@@ -108,25 +110,25 @@ impl<const N: usize> Node<N> {
         }
     }
 
-    /// The lanes that refer to anything, as a set of bits.
+    /// Returns the lanes that refer to anything, as a set of bits.
     #[inline(always)]
     pub(super) fn children(&self) -> u32 {
         (1 << self.width) - 1
     }
 
-    /// A component of a lane's normal.
+    /// Returns a component of a lane's normal.
     #[inline(always)]
     pub(super) fn component(normal: u32, axis: u32) -> f32 {
         Self::steps(normal, axis) * (1.0 / NORMAL_STEPS)
     }
 
-    /// The same in units of [`NORMAL_STEPS`].
+    /// Returns a component of a lane's normal, in units of 1 / [`NORMAL_STEPS`].
     #[inline(always)]
     pub(super) fn steps(normal: u32, axis: u32) -> f32 {
         ((normal << (22 - 10 * axis)) as i32 >> 22) as f32
     }
 
-    /// Energies that do not depend on the direction, and those of portals.
+    /// Returns the energies that do not depend on the direction, and those of portals.
     #[inline(always)]
     pub(super) fn energies(&self) -> [[f32; N]; 2] {
         let (energies, portals) = (self.energies, self.portals);
@@ -139,7 +141,7 @@ impl<const N: usize> Node<N> {
         [flux, portal]
     }
 
-    /// The cone of normals of a lane, by its axis and the sine and cosine of its half angle, and the mean normal.
+    /// Returns the cone of normals of a lane, by its axis and the sine and cosine of its half angle, and the mean normal.
     pub(super) fn cone(&self, lane: usize) -> (Vec3, [f32; 2], Vec3) {
         let normal = self.normals[lane];
         let axis = Vec3::from_array([0, 1, 2].map(|axis| Self::component(normal, axis))).normalize_or_zero();
@@ -154,10 +156,10 @@ impl<const N: usize> Node<N> {
     }
 
     pub(super) fn is_two_sided(&self, lane: usize) -> bool {
-        self.normals[lane] & TWO_SIDED != 0
+        self.normals[lane] & LANE_TWO_SIDED != 0
     }
 
-    /// The least and largest coordinates of all boxes, by axis. Each is rounded once, so that a box still holds what it
+    /// Returns the least and largest coordinates of all boxes, by axis. Each is rounded once, so that a box still holds what it
     /// was made for.
     #[inline(always)]
     pub(super) fn corners(&self) -> ([[f32; N]; 3], [[f32; N]; 3]) {
@@ -175,7 +177,7 @@ impl<const N: usize> Node<N> {
     }
 }
 
-/// What splitting needs to know of all leaves below a node: energies relative to the whole tree's.
+/// Energies of all leaves below a node, for splitting: relative to the whole tree's.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub(crate) struct Spread {
@@ -188,7 +190,7 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// The same of energies that are multiplied.
+    /// Multiplies all energies.
     pub(super) fn scale(&mut self, factor: f64) {
         self.mean = (f64::from(self.mean) * factor) as f32;
         self.variance = (f64::from(self.variance) * factor * factor) as f32;
@@ -201,14 +203,14 @@ impl Spread {
 pub(crate) struct Slot(u32);
 
 impl Slot {
-    /// Of the root, which no lane refers to.
+    /// Slot of the root, which no lane refers to.
     pub(super) const ROOT: Self = Self(u32::MAX);
 
     pub(super) fn new<const N: usize>(node: usize, lane: usize) -> Self {
         Self((node * N + lane) as u32)
     }
 
-    /// Node and lane, or `None` for the root.
+    /// Returns node and lane, or `None` for the root.
     #[inline]
     pub(super) fn get<const N: usize>(self) -> Option<(usize, usize)> {
         (self != Self::ROOT).then_some((self.0 as usize / N, self.0 as usize % N))

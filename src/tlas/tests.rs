@@ -11,6 +11,7 @@ use super::walk::ray::{Crossed, Met};
 use super::{Arity, LeafOracle, Splitting, Tlas, TlasView};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
+use crate::progress::Progress;
 use crate::receiver::ShadingPoint;
 use crate::simd::InstructionSet;
 use crate::testing::Pcg32;
@@ -21,7 +22,8 @@ type Light = (LightBounds, Moments);
 /// The tree over lights, and the lights in the order of its leaves.
 pub(super) fn build(arity: Arity, lights: &[Light]) -> (Tlas, Vec<u32>) {
     let (mut tlas, order) =
-        super::build(arity, lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
+        super::build(arity, lights.len(), &|light| lights[light as usize].0, &Progress::new(None, 1.0))
+            .expect("nobody cancels");
     tlas.fit(&|leaf| lights[order[leaf as usize] as usize]);
     (tlas, order)
 }
@@ -31,30 +33,36 @@ fn arity<const N: usize>() -> Arity {
     Arity::from_code(N as u32).expect("there is such an arity")
 }
 
-/// Leaves are all visible, and portals show the same in every direction.
-struct Open;
-
-impl LeafOracle for Open {
-    fn radiances(&self, _centers: [&[f32]; 3], _radii: &[f32], _set: u32, radiances: &mut [f32]) {
-        radiances.fill(1.0);
-    }
-
-    fn is_visible(&self, _leaf: u32) -> bool {
-        true
-    }
+/// A shading point before which some leaves are visible, and portals show the same in every direction.
+#[derive(Clone, Copy)]
+pub(super) struct Before<'a> {
+    x: &'a ShadingPoint,
+    /// Whether only leaves with odd numbers are visible of those in doubt, or all leaves.
+    odd_alone: bool,
 }
 
-/// Of the leaves in doubt only those with odd numbers are visible.
-struct Odd;
+impl LeafOracle for Before<'_> {
+    fn shading_point(&self) -> &ShadingPoint {
+        self.x
+    }
 
-impl LeafOracle for Odd {
     fn radiances(&self, _centers: [&[f32]; 3], _radii: &[f32], _set: u32, radiances: &mut [f32]) {
         radiances.fill(1.0);
     }
 
     fn is_visible(&self, leaf: u32) -> bool {
-        leaf % 2 == 1
+        !self.odd_alone || leaf % 2 == 1
     }
+}
+
+/// All leaves are visible.
+pub(super) fn open(x: &ShadingPoint) -> Before<'_> {
+    Before { x, odd_alone: false }
+}
+
+/// Of the leaves in doubt only those with odd numbers are visible.
+fn odd(x: &ShadingPoint) -> Before<'_> {
+    Before { x, odd_alone: true }
 }
 
 fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<Light> {
@@ -86,21 +94,21 @@ fn shading_point(i: usize, pcg: &mut Pcg32) -> ShadingPoint {
 }
 
 /// Probability of ending below a node where every weight is zero.
-fn dead_mass<const N: usize>(tlas: &WideTree<'_, N>, node: usize, x: &ShadingPoint, oracle: &impl LeafOracle) -> f64 {
-    let weights = tlas.nodes[node].weigh(x, oracle);
+fn dead_mass<const N: usize>(tlas: &WideTree<'_, N>, node: usize, oracle: &impl LeafOracle) -> f64 {
+    let weights = tlas.nodes[node].weigh(oracle);
     if weights == [0.0; N] {
         return 1.0;
     }
     let below = |lane| match tlas.nodes[node].child(lane) {
         Child::Node(index) if weights[lane] > 0.0 => {
-            crate::warp::pmf_wide(&weights, lane) * dead_mass(tlas, index as usize, x, oracle)
+            crate::warp::pmf_wide(&weights, lane) * dead_mass(tlas, index as usize, oracle)
         }
         _ => 0.0,
     };
     (0..N).map(below).sum()
 }
 
-fn probabilities_sum_to_one<const N: usize>(oracle: &impl LeafOracle) {
+fn probabilities_sum_to_one<const N: usize>(before: impl Fn(&ShadingPoint) -> Before<'_>) {
     let mut pcg = Pcg32::new(3, 1);
     for n in [2, 3, 17, 100, 3000] {
         let (tlas, _) = build(arity::<N>(), &cloud(n, &mut pcg));
@@ -108,8 +116,9 @@ fn probabilities_sum_to_one<const N: usize>(oracle: &impl LeafOracle) {
         view.validate().expect("a built tree is valid");
         for i in 0..12 {
             let x = shading_point(i, &mut pcg);
-            let leaves: f64 = (0..n as u32).map(|leaf| view.pmf(leaf, &x, oracle, None)).sum();
-            let dead = dead_mass(&view.wide::<N>(), 0, &x, oracle);
+            let oracle = &before(&x);
+            let leaves: f64 = (0..n as u32).map(|leaf| view.pmf(leaf, oracle, None)).sum();
+            let dead = dead_mass(&view.wide::<N>(), 0, oracle);
             assert!((leaves + dead - 1.0).abs() < 1e-9, "{n} lights: {leaves} + {dead}");
         }
     }
@@ -117,10 +126,10 @@ fn probabilities_sum_to_one<const N: usize>(oracle: &impl LeafOracle) {
 
 #[test]
 fn leaves_and_dead_ends_have_all_the_probability() {
-    probabilities_sum_to_one::<4>(&Open);
-    probabilities_sum_to_one::<8>(&Open);
-    probabilities_sum_to_one::<16>(&Open);
-    probabilities_sum_to_one::<8>(&Odd);
+    probabilities_sum_to_one::<4>(open);
+    probabilities_sum_to_one::<8>(open);
+    probabilities_sum_to_one::<16>(open);
+    probabilities_sum_to_one::<8>(odd);
 }
 
 #[test]
@@ -128,14 +137,17 @@ fn a_sample_has_the_probability_of_its_leaf() {
     let mut pcg = Pcg32::new(4, 1);
     let (tlas, _) = build(Arity::Eight, &cloud(5000, &mut pcg));
     let view = tlas.view();
+    let mut found = 0;
     for i in 0..20_000 {
         let x = shading_point(i, &mut pcg);
         let u = pcg.next_f32();
-        if let Some((leaf, pmf)) = view.sample(&x, &Odd, None, Variate::new(u, seed(&[u]))) {
-            let again = view.pmf(leaf, &x, &Odd, None);
+        if let Some((leaf, pmf)) = view.sample(&odd(&x), None, Variate::new(u, seed(&[u]))) {
+            let again = view.pmf(leaf, &odd(&x), None);
             assert!((pmf / again - 1.0).abs() < 1e-12, "leaf {leaf}: {pmf} {again}");
+            found += 1;
         }
     }
+    assert!(found > 10_000, "{found} drawn");
 }
 
 #[test]
@@ -156,21 +168,23 @@ fn all_instruction_sets_give_the_same_bits() {
 fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg: &mut Pcg32) {
     let (tlas, _) = build(arity::<N>(), lights);
     let tlas = &tlas.view().wide::<N>();
-    let mut found = 0;
+    let (mut found, mut entered) = (0, [0; 2]);
     for i in 0..3000 {
         let x = &shading_point(i, pcg);
         let x = &ShadingPoint { position: x.position * scale, ..*x };
         let u = pcg.next_f32();
         let draw = |level: InstructionSet| {
-            let drawn = level.run(SampleWalk { tlas, walk: Descent::new(x, &Odd, Variate::new(u, seed(&[u]))) });
-            let pmf = drawn.map(|(leaf, _)| level.run(PmfWalk { tlas, leaf, x, oracle: &Odd, first: None }).to_bits());
+            let drawn = level.run(SampleWalk { tlas, walk: Descent::new(odd(x), Variate::new(u, seed(&[u]))) });
+            let pmf = drawn.map(|(leaf, _)| level.run(PmfWalk { tlas, leaf, oracle: &odd(x), first: None }).to_bits());
             (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), pmf)
         };
         let mut all = InstructionSet::all().map(draw);
         let first = all.next();
         found += usize::from(first.is_some_and(|(drawn, ..)| drawn.is_some()));
         assert!(all.all(|other| Some(other) == first));
-        let (node, origin, axis) = (&tlas.nodes[i % tlas.nodes.len()], x.position, pcg.direction());
+        // Towards a light, at nodes near the root, so that something is met.
+        let (node, origin) = (&tlas.nodes[i % tlas.nodes.len().min(8)], x.position);
+        let axis = (lights[i % lights.len()].1.mean - origin).normalize();
         let inverse = axis.recip();
         let lanes = |level: InstructionSet| {
             let crossed = level.run(Crossed { node, origin, inverse });
@@ -179,7 +193,12 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let mut all = InstructionSet::all().map(lanes);
         let first = all.next();
         assert!(all.all(|other| Some(other) == first));
+        first.into_iter().for_each(|(crossed, met)| {
+            entered[0] += usize::from(crossed != 0);
+            entered[1] += usize::from(met != 0);
+        });
     }
+    assert!(entered.iter().all(|&count| count > 50), "{entered:?} entered");
     assert!(found > 2000, "{found} drawn");
 }
 
@@ -222,7 +241,8 @@ fn a_ray_finds_every_box_that_it_crosses() {
     let mut pcg = Pcg32::new(7, 1);
     let lights = cloud(2000, &mut pcg);
     let (tlas, order) = build(Arity::Eight, &lights);
-    for i in 0..300 {
+    let mut crossed = 0;
+    for i in 0..3000 {
         let origin = shading_point(i, &mut pcg).position;
         let direction = if i % 5 == 0 { [Vec3::X, Vec3::NEG_Y, Vec3::Z][i % 3] } else { pcg.direction() };
         let mut found = Vec::new();
@@ -230,10 +250,12 @@ fn a_ray_finds_every_box_that_it_crosses() {
         for (leaf, &light) in (0..).zip(&order) {
             if passes_through(origin, direction, &lights[light as usize].0.aabb) {
                 assert!(found.contains(&leaf), "leaf {leaf} from {origin} along {direction}");
+                crossed += 1;
             }
         }
         assert!(found.len() < 400, "{} boxes found", found.len());
     }
+    assert!(crossed > 300, "{crossed} boxes crossed");
 }
 
 /// Slab test in double precision, shrunk a little so that it decides only clear cases.
@@ -258,7 +280,7 @@ fn passes_through(origin: Vec3, direction: Vec3, aabb: &Aabb) -> bool {
 fn visits(tlas: &Tlas, x: &ShadingPoint, u: f32, splitting: &Splitting) -> Vec<(u32, f64)> {
     let mut visits = Vec::new();
     let variate = |draw| Variate::scrambled(u, u64::from(draw), seed(&[u]) ^ u64::from(draw));
-    tlas.view().sample_split(x, &Odd, splitting, variate, |leaf, count| visits.push((leaf, count)));
+    tlas.view().sample_split(&odd(x), splitting, variate, |leaf, count| visits.push((leaf, count)));
     visits
 }
 
@@ -274,7 +296,7 @@ fn split_visits_have_their_expected_counts() {
             assert!(visits.len() <= 64);
             most = most.max(visits.len());
             for (leaf, count) in visits {
-                let again = tlas.view().expected_count(leaf, &x, &Odd, &splitting);
+                let again = tlas.view().expected_count(leaf, &odd(&x), &splitting);
                 assert!((count / again - 1.0).abs() < 1e-12, "leaf {leaf}: {count} {again}");
             }
         }
@@ -286,16 +308,19 @@ fn split_visits_have_their_expected_counts() {
 fn without_splitting_there_is_one_visit_like_a_plain_sample() {
     let mut pcg = Pcg32::new(9, 1);
     let (tlas, _) = build(Arity::Eight, &cloud(300, &mut pcg));
+    let mut found = 0;
     for i in 0..500 {
         let x = shading_point(i, &mut pcg);
         for splitting in [Splitting { threshold: 0.0, levels: 9 }, Splitting { threshold: 1.0, levels: 0 }] {
             let visits = visits(&tlas, &x, pcg.next_f32(), &splitting);
             assert!(visits.len() <= 1);
+            found += visits.len();
             for (leaf, count) in visits {
-                assert!((count / tlas.view().pmf(leaf, &x, &Odd, None) - 1.0).abs() < 1e-12);
+                assert!((count / tlas.view().pmf(leaf, &odd(&x), None) - 1.0).abs() < 1e-12);
             }
         }
     }
+    assert!(found > 500, "{found} visits");
 }
 
 #[test]
@@ -312,7 +337,7 @@ fn broken_trees_are_refused() {
             Err(_) => refused += 1,
             Ok(()) => {
                 let x = shading_point(word, &mut pcg);
-                broken.view().sample(&x, &Open, None, Variate::new(pcg.next_f32(), 1));
+                broken.view().sample(&open(&x), None, Variate::new(pcg.next_f32(), 1));
                 broken.view().cross(x.position, Vec3::ONE, |_| ());
             }
         }

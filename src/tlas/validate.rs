@@ -5,8 +5,10 @@ use super::node::{Child, Node, Slot, wide};
 use super::tree::{TlasView, WideTree, for_arity};
 use crate::error::Error;
 
-/// Largest coordinate and largest step of a box: what is made of them stays finite.
-const FAR: f32 = 1e15;
+/// Largest coordinate and largest step of a box. *Proved*: with codes of a byte, squares of distances stay below 1e36 and so
+/// finite. Hosts
+/// keep below 1e9; a smaller bound would refuse nothing that is built.
+const FARTHEST: f32 = 1e15;
 
 impl TlasView<'_> {
     /// Checks that the words are whole nodes, every reference stays inside and points forward, every parent pointer
@@ -80,8 +82,8 @@ impl<const N: usize> Node<N> {
         let energies = energies.iter().map(|&energy| wide(energy)).enumerate();
         self.node_count <= self.width
             && usize::from(self.width) <= N
-            && origin.iter().all(|value| value.abs() <= FAR)
-            && steps.iter().all(|&step| (0.0..=FAR).contains(&wide(step)))
+            && origin.iter().all(|value| value.abs() <= FARTHEST)
+            && steps.iter().all(|&step| (0.0..=FARTHEST).contains(&wide(step)))
             && energies
                 .map(|(lane, energy)| (lane < self.width.into(), energy))
                 .all(|(is_child, energy)| if is_child { (0.0..f32::INFINITY).contains(&energy) } else { energy == 0.0 })

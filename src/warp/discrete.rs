@@ -44,14 +44,15 @@ pub(crate) fn keep_possible<const N: usize>(weights: &mut [f32; N], possible: im
     keep_least(weights, largest);
 }
 
-/// [`keep_possible`] of every weight that is positive.
+/// [`keep_possible`] of what is positive.
 #[inline(always)]
 pub(crate) fn keep_positive<const N: usize>(weights: &mut [f32; N]) {
     let mut largest = 0_i32;
     for weight in weights.iter_mut() {
         *weight = only_if(*weight > 0.0, within_range(*weight));
-        // Signed: the oldest machines have no vectors of the other comparison.
-        largest = largest.max(weight.to_bits() as i32);
+        // Signed, as more machines compare such vectors.
+        let bits = weight.to_bits() as i32;
+        largest = if bits > largest { bits } else { largest };
     }
     keep_least(weights, largest as u32);
 }

@@ -1,28 +1,30 @@
 //! The crate itself.
 
-use ::fanlight::{Hit, Illumination, LightSample, LightSampler, LightSamplerBuilder, Mesh, ShadingPoint, Weight};
+use ::fanlight::{Arity, Hit, Illumination, LightSample, LightSampler, Mesh, ShadingPoint, Weight};
 
 use super::{Drawn, Method};
 use crate::scenes::sky::environment;
 use crate::scenes::{Scene, Weight as SceneWeight};
 
-/// `N` is the arity of the tree over triangles, by default that of the crate.
-pub(crate) struct Fanlight<'a, const N: usize = 16> {
+/// The crate's sampler of a scene.
+pub(crate) struct Fanlight<'a> {
     scene: &'a Scene,
-    sampler: LightSampler<N>,
+    sampler: LightSampler,
     /// Whether a ray can cross several portals, so that the density of a point is not that of its direction.
     layered: bool,
 }
 
-impl<'a, const N: usize> Fanlight<'a, N> {
-    /// The crate with its defaults, or with another term inside of triangles.
-    pub(crate) fn new(scene: &'a Scene, illumination: Option<Illumination>) -> Self {
-        let mut builder = LightSamplerBuilder::new();
-        if let Some(illumination) = illumination {
-            builder.illumination(illumination);
-        }
+impl<'a> Fanlight<'a> {
+    /// The crate with its defaults.
+    pub(crate) fn new(scene: &'a Scene) -> Self {
+        Self::with(scene, Arity::default(), Illumination::default())
+    }
+
+    /// The crate with an arity of the tree over triangles, and a term inside of triangles.
+    pub(crate) fn with(scene: &'a Scene, arity: Arity, illumination: Illumination) -> Self {
+        let mut builder = LightSampler::builder().arity(arity).illumination(illumination);
         if let Some(sky) = &scene.sky {
-            builder.environment(environment(&sky.texels));
+            builder = builder.environment(environment(&sky.texels));
         }
         let texture = scene.image.as_ref().map(|image| builder.add_texture(image.texture()));
         for mesh in &scene.meshes {
@@ -40,8 +42,8 @@ impl<'a, const N: usize> Fanlight<'a, N> {
     }
 }
 
-impl<const N: usize> Fanlight<'_, N> {
-    pub(crate) fn sampler(&self) -> &LightSampler<N> {
+impl Fanlight<'_> {
+    pub(crate) fn sampler(&self) -> &LightSampler {
         &self.sampler
     }
 
@@ -58,11 +60,12 @@ impl<const N: usize> Fanlight<'_, N> {
     }
 }
 
-impl<const N: usize> Method for Fanlight<'_, N> {
+impl Method for Fanlight<'_> {
     #[inline]
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
-        let sample = self.sampler.at(x).sample(u)?;
-        let pdf = if self.layered { self.sampler.at(x).pdf_sample_direction(&sample) } else { sample.pdf };
+        let here = self.sampler.at(x);
+        let sample = here.sample(u)?;
+        let pdf = if self.layered { here.pdf_sample_direction(&sample) } else { sample.pdf };
         Some(self.drawn(&sample, pdf))
     }
 
@@ -77,20 +80,22 @@ impl<const N: usize> Method for Fanlight<'_, N> {
 
     #[inline]
     fn pdf(&self, x: &ShadingPoint, drawn: &Drawn) -> f64 {
+        let here = self.sampler.at(x);
         if self.layered {
-            return f64::from(self.sampler.at(x).pdf_direction(drawn.direction));
+            return f64::from(here.pdf_direction(drawn.direction));
         }
         let hit = Hit::new(self.scene.lights[drawn.light].id, drawn.barycentrics);
-        f64::from(self.sampler.at(x).pdf(&hit))
+        f64::from(here.pdf(&hit))
     }
 
     fn pmfs(&self, x: &ShadingPoint, wanted: &dyn Fn(usize) -> bool) -> Option<Vec<f64>> {
-        let pmf = |l: usize| if wanted(l) { self.sampler.at(x).pmf(self.scene.lights[l].id) } else { 0.0 };
+        let here = self.sampler.at(x);
+        let pmf = |l: usize| if wanted(l) { here.pmf(self.scene.lights[l].id) } else { 0.0 };
         Some((0..self.scene.lights.len()).map(|l| f64::from(pmf(l))).collect())
     }
 
     fn bytes(&self) -> usize {
-        self.sampler.as_view().bytes().iter().sum()
+        self.sampler.bytes().total()
     }
 
     fn draws_suns_apart(&self) -> bool {

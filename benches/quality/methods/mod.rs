@@ -15,7 +15,7 @@ mod texel_cdf;
 mod triangle;
 mod wide_tree;
 
-use ::fanlight::{Illumination, ShadingPoint};
+use ::fanlight::{Arity, Illumination, ShadingPoint};
 use glam::Vec3;
 
 pub(crate) use self::fanlight::Fanlight;
@@ -135,12 +135,13 @@ pub(crate) fn names(workload: &str) -> &'static [&'static str] {
 
 /// Builds the data that a method needs for a scene.
 pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
-    let talk = |illumination| Box::new(<Fanlight>::new(scene, Some(illumination)));
+    let talk = |illumination| Box::new(Fanlight::with(scene, Arity::default(), illumination));
+    let of_arity = |arity| Box::new(Fanlight::with(scene, arity, Illumination::default()));
     match name {
-        "fanlight" => Box::new(<Fanlight>::new(scene, None)),
-        "fanlight-4" => Box::new(Fanlight::<4>::new(scene, None)),
-        "fanlight-8" => Box::new(Fanlight::<8>::new(scene, None)),
-        "fanlight-16" => Box::new(Fanlight::<16>::new(scene, None)),
+        "fanlight" => Box::new(Fanlight::new(scene)),
+        "fanlight-4" => of_arity(Arity::Four),
+        "fanlight-8" => of_arity(Arity::Eight),
+        "fanlight-16" => of_arity(Arity::Sixteen),
         "talk-conservative" => talk(Illumination::Conservative),
         "talk-point-to-point" => talk(Illumination::PointToPoint),
         "talk-boundary" => talk(Illumination::Boundary),

@@ -10,7 +10,7 @@ pub(crate) mod sky;
 pub(crate) mod sphere;
 pub(crate) mod wall;
 
-use fanlight::{Filter, ShadingPoint, TriangleId};
+use fanlight::{Filter, MeshId, ShadingPoint, TriangleId};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use image::Image;
@@ -135,10 +135,10 @@ impl Scene {
     pub(crate) fn emitters(meshes: Vec<LightMesh>, image: Option<Image>, points: PointSet) -> Self {
         let mut lights = vec![];
         let mut first = vec![];
-        for (number, mesh) in (0..).zip(&meshes) {
+        for (id, mesh) in (0..).map(MeshId::from_index).zip(&meshes) {
             first.push(lights.len());
             let light = |(triangle, indices): (u32, &[u32; 3])| Light {
-                id: TriangleId { mesh: number, triangle },
+                id: TriangleId::new(id, triangle),
                 vertices: indices.map(|i| mesh.positions[i as usize].as_dvec3()),
                 uvs: indices.map(|i| mesh.uvs.get(i as usize).copied().unwrap_or_default().as_dvec2()),
                 weight: mesh.weight,
@@ -156,7 +156,7 @@ impl Scene {
 
     /// Number of a triangle among all lights.
     pub(crate) fn light_index(&self, id: TriangleId) -> usize {
-        self.first[id.mesh as usize] + id.triangle as usize
+        self.first[id.mesh.index() as usize] + id.triangle as usize
     }
 
     /// Radiance or transmittance of a point of a light.

@@ -70,7 +70,7 @@ pub(crate) fn run(args: &Args) {
     println!("{:12} {:>8} {:20} {:>8} {:>8} {:>8}", "workload", "exponent", "sampling", "relvar", "p90", "EW");
     for workload in WORKLOADS.iter().filter(|workload| args.wants(workload)) {
         let scene = scenes::scene(workload);
-        let method = Fanlight::new(&scene, None);
+        let method = Fanlight::new(&scene);
         let means: Vec<f64> = (0..scene.lights.len()).map(|light| scene.mean_weight(light)).collect();
         let points = scene.points.quality(args.effort.study_points);
         for exponent in EXPONENTS {

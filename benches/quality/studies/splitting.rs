@@ -46,7 +46,7 @@ pub(crate) fn run(args: &Args) {
     for workload in WORKLOADS.iter().filter(|workload| args.wants(workload)) {
         let scene = scenes::scene(workload);
         let points = truths(&scene, 5 * args.effort.study_points);
-        let method = Fanlight::new(&scene, None);
+        let method = Fanlight::new(&scene);
         let study = Study { scene: &scene, method, points, samples: args.effort.samples };
         study.compare(workload, &args.effort);
     }
@@ -60,10 +60,8 @@ impl Study<'_> {
         for (way, ns) in ways.into_iter().zip(&times) {
             let all = self.measure(way);
             let gain = |get: fn(&Summary) -> f64| short(get(&one) * times[0] / (get(&all) * ns));
-            let (count, Splitting { threshold, levels }) = way
-                .map_or((1.0, Splitting { threshold: 0.0, levels: 0 }), |splitting| {
-                    (self.count(&splitting), splitting)
-                });
+            let (count, Splitting { threshold, levels, .. }) =
+                way.map_or((1.0, Splitting::new(0.0, 0)), |splitting| (self.count(&splitting), splitting));
             let [median, p90, mean, ns] = [all.median, all.p90, all.energy_weighted, *ns].map(short);
             println!(
                 "{workload:12} {count:>8.2} {levels:>6} {threshold:>9.3} {median:>8} {p90:>8} {mean:>8} {ns:>8} \
@@ -77,22 +75,22 @@ impl Study<'_> {
 
     /// The fewest levels that can give so many samples, and the threshold that gives about so many.
     fn splitting(&self, count: f64) -> Splitting {
-        let can = |levels: &u32| self.count(&Splitting { threshold: 1.0, levels: *levels }) >= count;
+        let can = |levels: &u32| self.count(&Splitting::new(1.0, *levels)) >= count;
         let levels = (1..LEVELS).find(can).unwrap_or(LEVELS);
         let (mut low, mut high) = (0.0_f32, 1.0_f32);
         for _ in 0..12 {
             let threshold = 0.5 * (low + high);
-            let is_less = self.count(&Splitting { threshold, levels }) < count;
+            let is_less = self.count(&Splitting::new(threshold, levels)) < count;
             *(if is_less { &mut low } else { &mut high }) = threshold;
         }
-        Splitting { threshold: 0.5 * (low + high), levels }
+        Splitting::new(0.5 * (low + high), levels)
     }
 
     /// Mean number of samples.
     fn count(&self, splitting: &Splitting) -> f64 {
         let mut samples = Samples::new();
         for (i, (x, _)) in self.points.iter().enumerate() {
-            self.method.sampler().sample_split(x, Pcg32::new(i as u64, 6).uniform3(), splitting, &mut samples);
+            self.method.sampler().at(x).sample_split(Pcg32::new(i as u64, 6).uniform3(), splitting, &mut samples);
         }
         samples.len() as f64 / self.points.len() as f64
     }
@@ -101,8 +99,8 @@ impl Study<'_> {
     fn draw(&self, x: &ShadingPoint, u: [f32; 3], way: Way, samples: &mut Samples) {
         samples.clear();
         match way {
-            Some(splitting) => self.method.sampler().sample_split(x, u, &splitting, samples),
-            None => samples.extend(self.method.sampler().sample(x, u)),
+            Some(splitting) => self.method.sampler().at(x).sample_split(u, &splitting, samples),
+            None => samples.extend(self.method.sampler().at(x).sample(u)),
         }
     }
 

@@ -5,7 +5,9 @@
 use core::hint::black_box;
 use std::time::Instant;
 
-use fanlight::{Filter, Hit, Illumination, LightSampler, Mesh, ShadingPoint, Sides, Texture, TriangleId, Weight, Wrap};
+use fanlight::{
+    Filter, Hit, Illumination, LightSampler, Mesh, MeshId, ShadingPoint, Sides, Texture, TriangleId, Weight, Wrap,
+};
 use glam::{DVec3, Vec2, Vec3};
 
 use crate::args::Effort;
@@ -71,13 +73,12 @@ impl Emission {
 const VERTICES: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 
 fn sampler(texels: &[f32], term: Illumination) -> LightSampler {
-    let mut builder = LightSampler::builder();
+    let mut builder = LightSampler::builder().illumination(term);
     let texture = Texture::new(TEXELS, TEXELS, texels).expect("the image is finite");
     let texture = builder.add_texture(texture.filter(Filter::Nearest).wrap(Wrap::Clamp, Wrap::Clamp));
     let uvs = VERTICES.map(|v| Vec2::new(v.x, v.y));
     let mesh = Mesh::emitter(&VERTICES, &[[0, 1, 2]]).uvs(&uvs).weight(Weight::Texture(texture)).sides(Sides::Two);
     builder.add_mesh(&mesh).expect("the triangle is valid");
-    builder.illumination(term);
     builder.build().expect("the triangle is valid")
 }
 
@@ -155,7 +156,7 @@ fn nanoseconds(term: Illumination, effort: &Effort) -> f64 {
         let mut pcg = Pcg32::new(3, 3);
         let start = Instant::now();
         for i in 0..effort.calls {
-            black_box(samplers[i % 2].sample(&points[i % points.len()], pcg.uniform3()));
+            black_box(samplers[i % 2].at(&points[i % points.len()]).sample(pcg.uniform3()));
         }
         start.elapsed().as_secs_f64() * 1e9 / effort.calls as f64
     };

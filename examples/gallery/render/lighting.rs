@@ -3,7 +3,7 @@
 
 pub(crate) use fanlight::{Filter, Illumination, Wrap};
 
-use fanlight::{Emission, Hit, LightSampler, Mesh, PointSampler, ShadingPoint, Sides, TriangleId};
+use fanlight::{Emission, Hit, LightSampler, Mesh, MeshId, PointSampler, ShadingPoint, Sides, TriangleId};
 use glam::Vec3;
 
 use super::Error;
@@ -52,8 +52,7 @@ impl Lights {
         let transmission: Vec<_> = (portals.iter().enumerate())
             .map(|(i, mesh)| clear(model, &model.materials[mesh.material]).times(factor(i)))
             .collect();
-        let mut builder = LightSampler::builder();
-        builder.illumination(illumination).environment(environment(model)?);
+        let mut builder = LightSampler::builder().illumination(illumination).environment(environment(model)?);
         for (mesh, weight) in emitters.iter().zip(&emission) {
             let mesh_light = Mesh::emitter(&mesh.positions, &mesh.indices).uvs(&mesh.uvs);
             weight.add(&mut builder, mesh_light.sides(sides(&model.materials[mesh.material])))?;
@@ -62,10 +61,10 @@ impl Lights {
             let portal = Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs);
             weight.add(&mut builder, portal.sides(sides(&model.materials[mesh.material])))?;
         }
-        let mut next = 0..;
+        let mut next = (0..).map(MeshId::from_index);
         let ids = model.meshes.iter().flat_map(|mesh| {
             let number = emits(&mesh).then(|| next.next()).flatten();
-            (0..mesh.indices.len() as u32).map(move |triangle| number.map(|mesh| TriangleId { mesh, triangle }))
+            (0..mesh.indices.len() as u32).map(move |triangle| number.map(|mesh| TriangleId::new(mesh, triangle)))
         });
         Ok(Self { ids: ids.collect(), emitters: emitters.len() as u32, sampler: builder.build()? })
     }
@@ -98,8 +97,8 @@ impl Lights {
 
     /// A portal's number and a direction through it, as drawn for a point of a surface.
     pub(crate) fn sample_portal(&self, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<(usize, Vec3)> {
-        let sample = self.sampler.sample(&ShadingPoint::surface(position, normal), u)?;
-        let portal = sample.hit.triangle.mesh.checked_sub(self.emitters)?;
+        let sample = self.sampler.at(&ShadingPoint::surface(position, normal)).sample(u)?;
+        let portal = sample.hit.triangle.mesh.index().checked_sub(self.emitters)?;
         Some((portal as usize, sample.direction))
     }
 
@@ -151,7 +150,7 @@ impl Outgoing<'_> {
     /// A ray from an emitter or through a portal, by the light that it brings.
     pub(crate) fn sample(&self, u: [f32; 5]) -> Option<LightRay> {
         let ray = self.emission.sample(u)?;
-        let emitted = ray.hit.triangle.mesh < self.lights.emitters;
+        let emitted = ray.hit.triangle.mesh.index() < self.lights.emitters;
         Some(LightRay { origin: ray.position, direction: ray.direction, emitted })
     }
 
@@ -161,7 +160,7 @@ impl Outgoing<'_> {
         match from {
             None => self.emission.pdf_ray(position, towards),
             Some(Point { triangle, barycentrics, .. }) => self.lights.ids[*triangle]
-                .map_or(0.0, |triangle| self.emission.pdf(&Hit { triangle, barycentrics: *barycentrics }, -towards)),
+                .map_or(0.0, |triangle| self.emission.pdf(&Hit::new(triangle, *barycentrics), -towards)),
         }
     }
 }

@@ -170,7 +170,7 @@ impl<'a> PathTracer<'a> {
     /// Density per solid angle with which all techniques together find the light from a direction: that of an
     /// emitter's point, or that of the sky. `lights_pdf` is the light sampler's part of it, if it is known.
     fn density(&self, x: &Vertex<'_>, direction: Vec3, from: Option<&Point>, lights_pdf: Option<f32>) -> f32 {
-        let lights_pdf = lights_pdf.unwrap_or_else(|| x.lights.at(direction).pdf(from));
+        let lights_pdf = lights_pdf.unwrap_or_else(|| x.lights.pdf(direction, from));
         if matches!(x.lights, ChoiceAt::Single(_)) {
             return lights_pdf;
         }

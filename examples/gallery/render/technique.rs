@@ -110,7 +110,7 @@ impl ChoiceAt<'_> {
             Self::Fanlight(lights) => lights.sample(u),
             Self::Single(lights) => lights.sample_single(u),
             Self::Table(table, position) => table.sample(*position, u),
-            Self::Published(lights, x) => lights.at(x).sample(u),
+            Self::Published(lights, x) => lights.sample(x, u),
         }
     }
 
@@ -121,7 +121,7 @@ impl ChoiceAt<'_> {
             Self::None | Self::Single(_) => 0.0,
             Self::Fanlight(lights) => lights.pdf(direction),
             Self::Table(table, _) => from.map_or(0.0, |point| table.pdf(direction, point)),
-            Self::Published(lights, x) => from.map_or(0.0, |point| lights.at(x).pdf(direction, point)),
+            Self::Published(lights, x) => from.map_or(0.0, |point| lights.pdf(x, direction, point)),
         }
     }
 }

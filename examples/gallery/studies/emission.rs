@@ -60,19 +60,19 @@ impl<'a> Emitter<'a> {
         if let Source::Sky = source {
             let environment =
                 Environment::from_lat_long(sky.width(), sky.height(), &sky.luminance(), Filter::Bilinear)?;
-            builder.environment(environment.with_rotation(Environment::Y_UP_LAT_LONG)?);
+            builder = builder.environment(environment.with_rotation(Environment::Y_UP_LAT_LONG)?);
         }
         let texture = Texture::new(bitmap.width, bitmap.height, &open)?.filter(bitmap.filter);
         let texture = builder.add_texture(texture.wrap(bitmap.wrap[0], bitmap.wrap[1]));
         // A light outside looks at the portal from behind.
         let sides = if let Source::Point(_) = source { Sides::Two } else { Sides::One };
         let portal = Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(sides);
-        builder.add_mesh(&portal.weight(Weight::Texture(texture)))?;
+        let sampler = builder.mesh(&portal.weight(Weight::Texture(texture)))?.build()?;
 
         let corners = || model.meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
         let (low, high) = (corners().fold(Vec3::INFINITY, Vec3::min), corners().fold(Vec3::NEG_INFINITY, Vec3::max));
         let (center, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
-        Ok(Self { sampler: builder.build()?, sky, source, center, radius })
+        Ok(Self { sampler, sky, source, center, radius })
     }
 
     /// The way through the portal.

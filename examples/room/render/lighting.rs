@@ -30,8 +30,7 @@ impl Lighting {
     pub(crate) fn new(room: &Room, sky: &Sky) -> Result<Self, Error> {
         let environment = Environment::from_lat_long(sky.width(), sky.height(), &sky.luminance(), Filter::Bilinear)?
             .with_rotation(Environment::Y_UP_LAT_LONG)?;
-        let mut builder = LightSampler::builder();
-        builder.environment(environment);
+        let mut builder = LightSampler::builder().environment(environment);
 
         let window = &room.portal;
         let mut portal = Mesh::portal(&window.positions, &window.indices).sides(Sides::One);
@@ -39,8 +38,7 @@ impl Lighting {
             let texture = builder.add_texture(transmittance(mask)?);
             portal = portal.weight(Weight::Texture(texture)).uvs(&window.uvs);
         }
-        builder.add_mesh(&portal)?;
-        Ok(Self { lights: builder.build()? })
+        Ok(Self { lights: builder.mesh(&portal)?.build()? })
     }
 
     /// A direction to the sky, bright parts more often than dark ones.

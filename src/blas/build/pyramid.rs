@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::blas::build::texture::Texture;
+use crate::parallel::{self, WORTHWHILE};
 
 /// Bytes for edges between the few large texels of a small image. All its triangles share it: the first ones take what
 /// they need. A budget: images of fewer than 2^17 texels have sharper edges with more.
@@ -25,7 +26,14 @@ pub(crate) struct TexturePyramid<'a> {
     texture: Texture<'a>,
     /// From level 1 up to the one that is a single block.
     levels: Vec<PyramidLevel>,
-    /// Bytes that trees over this image may still take beyond two a texel.
+    /// What is left of the image's memory.
+    pub(super) memory: ImageMemory,
+}
+
+/// What trees over an image may still take.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct ImageMemory {
+    /// Bytes beyond two a texel.
     pub(super) extra: f64,
     /// Bytes that triangles so far have left of what they could have taken: later ones may have them.
     pub(super) saved: f64,
@@ -40,17 +48,22 @@ struct PyramidLevel {
 impl<'a> TexturePyramid<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
-        let mut pyramid = Self { texture, levels: Vec::new(), extra: BYTES_PER_IMAGE, saved: 0.0 };
+        let memory = ImageMemory { extra: BYTES_PER_IMAGE, saved: 0.0 };
+        let mut pyramid = Self { texture, levels: Vec::new(), memory };
         let mut size = texture.size();
         while size != [1, 1] {
             let below = pyramid.levels.len() as u32;
             let [w, h] = size.map(|n| n.div_ceil(2));
-            let mut blocks = Vec::with_capacity(w as usize * h as usize);
-            for y in 0..h {
-                for x in 0..w {
-                    blocks.push(pyramid.merge(below, x, y, size));
+            let mut blocks = alloc::vec![TexelBlock { min: 0.0, max: 0.0, mean: 0.0 }; w as usize * h as usize];
+            // Rows at once that are worth handing to another thread.
+            let rows = (WORTHWHILE / w as usize).max(1);
+            parallel::for_each_chunk(&mut blocks, rows * w as usize, |chunk, blocks| {
+                for (row, blocks) in blocks.chunks_exact_mut(w as usize).enumerate() {
+                    for (x, block) in (0..).zip(blocks) {
+                        *block = pyramid.merge(below, x, (chunk * rows + row) as u32, size);
+                    }
                 }
-            }
+            });
             size = [w, h];
             pyramid.levels.push(PyramidLevel { size, blocks });
         }

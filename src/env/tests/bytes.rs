@@ -3,7 +3,7 @@
 use super::*;
 use crate::env::features::FeatureLimits;
 use crate::env::view::EnvironmentHeader;
-use crate::env::{BrightFeature, EnvironmentImage, EnvironmentView, FeatureTexel};
+use crate::env::{EnvironmentImage, EnvironmentView, FeatureNode, FeatureTexel};
 use crate::error::Error;
 use crate::warp::Variate;
 
@@ -65,7 +65,7 @@ fn parts_that_do_not_fit_are_refused() {
 }
 
 /// Changes the features of an environment, and says whether the result is refused.
-fn is_refused(parts: EnvironmentView<'_>, change: impl Fn(&mut BrightFeature, &mut [FeatureTexel])) -> bool {
+fn is_refused(parts: EnvironmentView<'_>, change: impl Fn(&mut FeatureNode, &mut [FeatureTexel])) -> bool {
     let mut features = parts.features.to_vec();
     let mut feature_texels = parts.feature_texels.to_vec();
     change(&mut features[0], &mut feature_texels);
@@ -83,12 +83,12 @@ fn features_that_cannot_be_sampled_are_refused() {
     assert_eq!((parts.features.len(), parts.feature_texels.len()), (1, 2));
     assert!(!is_refused(parts, |_, _| ()));
     for value in [f32::NAN, f32::INFINITY, -1.0, 1e31] {
-        let changes: [fn(&mut BrightFeature, &mut [FeatureTexel], f32); 9] = [
+        let changes: [fn(&mut FeatureNode, &mut [FeatureTexel], f32); 9] = [
             |feature, _, value| feature.axis[1] = value,
             |feature, _, value| feature.sin_radius = value,
             |feature, _, value| feature.power = value,
-            |_, texels, value| texels[1].sum = value,
-            |_, texels, value| texels[0].sum = value,
+            |_, texels, value| texels[1].cap = value,
+            |_, texels, value| texels[1].excess = value,
             |_, texels, value| texels[0].excess = value,
             |_, texels, value| texels[0].margin = value,
             |_, texels, value| texels[1].radius = value,
@@ -103,13 +103,45 @@ fn features_that_cannot_be_sampled_are_refused() {
     assert!(is_refused(parts, |feature, _| feature.range = [0, 1]));
     assert!(is_refused(parts, |feature, _| feature.range = [0, 0]));
     assert!(is_refused(parts, |feature, _| feature.range = [u32::MAX, 2]));
-    assert!(is_refused(parts, |feature, _| feature.level = 7));
-    assert!(is_refused(parts, |feature, _| feature.level = u32::MAX));
-    assert!(is_refused(parts, |_, texels| texels[1].texel = texels[0].texel));
-    assert!(is_refused(parts, |_, texels| texels[1].texel = 64 * 64));
+    assert!(is_refused(parts, |feature, _| feature.next = 0));
+    assert!(is_refused(parts, |feature, _| feature.next = 2));
+    assert!(is_refused(parts, |feature, _| feature.is_single = 0));
+    assert!(is_refused(parts, |feature, _| feature.is_single = 2));
+    assert!(is_refused(parts, |_, texels| texels[1].level = 7));
+    assert!(is_refused(parts, |_, texels| texels[1].level = u32::MAX));
+    assert!(is_refused(parts, |_, texels| texels[1].code = texels[0].code));
+    assert!(is_refused(parts, |_, texels| texels[1].code = 64 * 64));
     assert!(is_refused(parts, |_, texels| texels.swap(0, 1)));
-    let features = [parts.features[0]; 9];
+    let features = [parts.features[0]; 3];
     assert!(checked(EnvironmentView { features: &features, ..parts }).is_err());
+    // Two features that are one node each, below a node of both.
+    let [feature] = parts.features else { panic!("{:?}", parts.features) };
+    let half = |range, next| FeatureNode { power: 0.5 * feature.power, range, next, ..*feature };
+    let mut same = [parts.feature_texels[0]; 2];
+    (same[1].code, same[1].excess) = (parts.feature_texels[1].code, same[0].excess);
+    let half_power = same[0].power();
+    let tree = [
+        FeatureNode { next: 3, is_single: 0, power: 2.0 * half_power, ..*feature },
+        FeatureNode { power: half_power, ..half([0, 1], 2) },
+        FeatureNode { power: half_power, ..half([1, 2], 3) },
+    ];
+    let with =
+        |tree: &[FeatureNode]| checked(EnvironmentView { features: tree, feature_texels: &same, ..parts }).is_ok();
+    assert!(with(&tree));
+    for i in 0..3 {
+        let changes: [fn(&mut FeatureNode); 5] = [
+            |node| node.next += 1,
+            |node| node.next -= 1,
+            |node| node.range[0] += 1,
+            |node| node.range[1] -= 1,
+            |node| node.power *= 1.1,
+        ];
+        for (number, change) in changes.into_iter().enumerate() {
+            let mut broken = tree;
+            change(&mut broken[i]);
+            assert!(!with(&broken), "{i} {number}");
+        }
+    }
     assert!(checked(EnvironmentView { features: &[], ..parts }).is_err());
     assert!(checked(EnvironmentView { features: &[], feature_texels: &[], ..parts }).is_err());
     assert!(checked(EnvironmentView { feature_texels: &[], ..parts }).is_err());
@@ -132,22 +164,23 @@ fn environments_of_other_limits_load() {
         FeatureLimits { contrast: 200.0, ..FeatureLimits::default() },
         FeatureLimits { sin_radius: 1.0, image_share: 0.5, contrast: 1.5, ..FeatureLimits::default() },
         FeatureLimits { features: 1, ..FeatureLimits::default() },
-        FeatureLimits { texels: 1, sin_radius: 0.5, ..FeatureLimits::default() },
+        FeatureLimits { blocks: 1, sin_radius: 0.5, ..FeatureLimits::default() },
         FeatureLimits { flux_share: 0.9, ..FeatureLimits::default() },
     ] {
         let image = EnvironmentImage::equal_area(64, &image).filter(Filter::Nearest);
-        let environment = Environment::with_limits(&image, &limits).unwrap();
+        let environment = Environment::with_limits(&image, &limits, None).unwrap();
         different += u32::from(environment != default);
         let view = checked(environment.as_view()).unwrap();
         let mut pcg = Pcg32::new(1, 7);
         for i in 0..2000 {
             let sample = view.sample([pcg.next_f32(), pcg.next_f32()]).unwrap();
             assert!(sample.pdf.is_finite() && sample.pdf > 0.0);
-            for feature in 0..view.bright_features().len() {
+            for node in 0..view.feature_nodes().len() {
                 let u = [Variate::new(pcg.next_f32(), i), Variate::new(pcg.next_f32(), !i)];
-                let direction = view.sample_feature(feature, u);
+                let direction = view.sample_feature(node, u);
                 assert!((direction.length() - 1.0).abs() < 1e-6);
-                assert!(view.feature_excess(feature, direction) > 0.0);
+                let (block, excess) = view.feature_at(direction).expect("a block of the node");
+                assert!(excess > 0.0 && view.feature_nodes()[node].holds_block(block));
             }
         }
     }

@@ -1,5 +1,7 @@
 //! The bright features that are visible at one shading point, each through a part of a portal.
 
+use smallvec::SmallVec;
+
 use super::view::FeaturePart;
 use crate::warp::sum;
 
@@ -13,55 +15,52 @@ pub(super) const MAX_VISIBLE: usize = 64;
 /// Stands for all portals.
 pub(super) const ANY_PORTAL: u32 = u32::MAX;
 
-/// A feature through a part of a portal.
+/// A feature, or a group of features, through a part of a portal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct VisibleFeature {
     /// Leaf of the portal, or [`ANY_PORTAL`].
     pub(super) leaf: u32,
-    pub(super) feature: u32,
+    /// Node of the tree over the features.
+    pub(super) node: u32,
     pub(super) part: FeaturePart,
 }
 
-/// Features through parts of portals.
-#[derive(Clone, Debug)]
+/// Features through parts of portals. Written only as far as it is used: most points see few.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct VisibleFeatures {
-    visible: [VisibleFeature; MAX_VISIBLE],
+    /// Never more than there is room for.
+    visible: SmallVec<[VisibleFeature; MAX_VISIBLE]>,
     /// Irradiance from each.
-    weights: [f32; MAX_VISIBLE],
-    count: usize,
+    weights: SmallVec<[f32; MAX_VISIBLE]>,
     /// Whether the shading point is close to one of the portals.
     is_close: bool,
 }
 
-impl Default for VisibleFeatures {
-    /// No feature yet.
-    #[inline]
-    fn default() -> Self {
-        Self {
-            visible: [VisibleFeature { leaf: 0, feature: 0, part: FeaturePart::WHOLE }; MAX_VISIBLE],
-            weights: [0.0; MAX_VISIBLE],
-            count: 0,
-            is_close: false,
-        }
-    }
-}
-
 impl VisibleFeatures {
     /// Irradiances from all that is listed.
+    #[inline]
     pub(super) fn weights(&self) -> &[f32] {
-        &self.weights[..self.count]
+        &self.weights
     }
 
     /// Number of listed parts.
+    #[inline]
     pub(super) fn len(&self) -> usize {
-        self.count
+        self.visible.len()
     }
 
-    /// Appends a feature. There must be room for it.
-    pub(super) fn push(&mut self, leaf: u32, feature: usize, part: FeaturePart, weight: f32) {
-        self.visible[self.count] = VisibleFeature { leaf, feature: feature as u32, part };
-        self.weights[self.count] = weight;
-        self.count += 1;
+    /// Appends a feature. Without room for it, it replaces the last one.
+    pub(super) fn push(&mut self, leaf: u32, node: u32, part: FeaturePart, weight: f32) {
+        self.truncate(MAX_VISIBLE - 1);
+        self.visible.push(VisibleFeature { leaf, node, part });
+        self.weights.push(weight);
+    }
+
+    /// Forgets all but the first entries.
+    #[inline]
+    fn truncate(&mut self, len: usize) {
+        self.visible.truncate(len);
+        self.weights.truncate(len);
     }
 
     /// Notes whether the shading point is close to a portal that a feature may be visible through.
@@ -75,9 +74,9 @@ impl VisibleFeatures {
     }
 
     /// Replaces all that is listed from `start` on by a feature as if there were no walls.
-    pub(super) fn merge(&mut self, start: usize, feature: usize, weight: f32) {
-        self.count = start;
-        self.push(ANY_PORTAL, feature, FeaturePart::WHOLE, weight);
+    pub(super) fn merge(&mut self, start: usize, node: u32, weight: f32) {
+        self.truncate(start);
+        self.push(ANY_PORTAL, node, FeaturePart::WHOLE, weight);
     }
 
     /// Returns the irradiance from all that is listed from `start` on.
@@ -95,9 +94,9 @@ impl VisibleFeatures {
         self.visible[index]
     }
 
-    /// Returns the entries of one feature with their weights.
-    pub(super) fn of_feature(&self, feature: usize) -> impl Iterator<Item = (VisibleFeature, f32)> {
-        let listed = self.visible.iter().copied().zip(self.weights().iter().copied());
-        listed.filter(move |(visible, _)| visible.feature as usize == feature)
+    /// Returns the entries with their weights.
+    #[inline]
+    pub(super) fn entries(&self) -> impl Iterator<Item = (&VisibleFeature, f32)> {
+        self.visible.iter().zip(self.weights().iter().copied())
     }
 }

@@ -5,6 +5,7 @@
 //! like those of the trees, the density of a direction is a plain sum over the portals that it crosses.
 
 mod clipped_square;
+mod groups;
 mod list;
 mod opening;
 #[cfg(test)]
@@ -12,14 +13,14 @@ mod tests;
 mod texel_cut;
 mod view;
 
-use super::{Density, Technique, Variates, Viewpoint};
+use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
 use crate::blas::Lattice;
-use crate::env::BrightFeature;
+use crate::env::FeatureNode;
 use crate::light::{LightKind, LightPoint, LightView, LightViewKind};
 use crate::math;
-use crate::receiver::ReceiverKind;
 use crate::warp::{Variate, pick, sum};
 
+use groups::{Group, Groups};
 pub(crate) use list::VisibleFeatures;
 use list::{ANY_PORTAL, MAX_VISIBLE, VisibleFeature};
 use view::FeatureView;
@@ -27,26 +28,25 @@ use view::FeatureView;
 impl VisibleFeatures {
     /// Lists all features that are visible from a shading point.
     pub(super) fn find(&mut self, at: &Viewpoint<'_>) {
-        for feature in 0..at.scene.environment.bright_features().len() {
-            self.find_one(feature, at);
+        let mut groups = Groups::empty();
+        groups.fill(at);
+        let mut left = groups.as_slice().len();
+        for group in groups.as_slice() {
+            left -= 1;
+            // Every group after this one keeps a place.
+            self.find_group(*group, MAX_VISIBLE - left, at);
         }
     }
 
-    /// Appends the parts of portals that a feature is visible through.
-    fn find_one(&mut self, feature: usize, at: &Viewpoint<'_>) {
-        let features = at.scene.environment.bright_features();
-        let axis = at.scene.environment.feature_axis(feature);
-        let BrightFeature { sin_radius, power, .. } = features[feature];
-        let cosine = at.x.receiver.mean_over_cone(axis, sin_radius);
-        if cosine == 0.0 {
-            return;
-        }
+    /// Appends the parts of portals that a group of features is visible through, as long as there are fewer than `end`.
+    fn find_group(&mut self, Group { node, cosine }: Group, end: usize, at: &Viewpoint<'_>) {
+        let environment = &at.scene.environment;
+        let FeatureNode { sin_radius, power, .. } = environment.feature_nodes()[node as usize];
+        let axis = environment.feature_axis(node as usize);
         let start = self.len();
-        // Every feature after this one keeps a place.
-        let end = MAX_VISIBLE - (features.len() - 1 - feature);
         let mut more = 0.0;
         let cone = [sin_radius, math::sqrt((1.0 - sin_radius * sin_radius).max(0.0))];
-        at.scene.tlas.meet(at.x.position, axis, cone, |leaf| {
+        let visit = |leaf: u32| {
             let scale = at.scene.lights.scale(leaf);
             if !at.scene.lights.light(leaf).is_portal() || scale == 0.0 {
                 return;
@@ -58,29 +58,35 @@ impl VisibleFeatures {
             let view = &at.view(leaf);
             let Some(triangle) = view.as_ref().and_then(LightView::as_portal) else { return };
             self.note(triangle.is_close());
-            FeatureView::new(triangle, &at.scene.environment, feature).visit(|part, through| {
+            FeatureView::new(triangle, environment, node as usize).visit(|part, through| {
                 if self.len() < end {
-                    self.push(leaf, feature, part, through * scale * cosine);
+                    self.push(leaf, node, part, through * scale * cosine);
                 } else {
                     more += 1.0;
                 }
             });
-        });
+        };
+        if sin_radius < 1.0 {
+            at.scene.tlas.meet(at.x.position, axis, cone, visit);
+        } else {
+            (0..at.scene.lights.len() as u32).for_each(visit);
+        }
         if more > 0.0 {
             let all = self.irradiance_from(start) * (1.0 + more / (end - start) as f32);
-            self.merge(start, feature, all.min(power * cosine));
+            self.merge(start, node, all.min(power * cosine));
         }
     }
 
     /// Draws a point on a portal towards one entry of the list.
     fn point(&self, at: &Viewpoint<'_>, index: usize, u: [Variate; 2]) -> Option<LightPoint> {
-        let VisibleFeature { leaf, feature, part } = self.get(index);
-        let feature = feature as usize;
+        let VisibleFeature { leaf, node, part } = self.get(index);
+        let node = node as usize;
         if leaf == ANY_PORTAL {
-            return least_crossed(at, at.scene.environment.sample_feature(feature, u));
+            return least_crossed(at, at.scene.environment.sample_feature(node, u));
         }
-        let view = at.view(leaf)?;
-        let point = FeatureView::new(view.as_portal()?, &at.scene.environment, feature).sample(part, u)?;
+        let view = &at.view(leaf);
+        let triangle = view.as_ref()?.as_portal()?;
+        let point = FeatureView::new(triangle, &at.scene.environment, node).sample(part, u)?;
         Some(LightPoint { leaf, point })
     }
 }
@@ -94,37 +100,39 @@ impl Technique for VisibleFeatures {
         &self,
         at: &Viewpoint<'_>,
         mut u: Variates,
-        then: impl FnOnce(LightPoint, Density, &LightView<'_>) -> Option<R>,
+        then: impl FnOnce(PlacedPoint, Density, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
         let index = pick(self.weights(), self.total(), &mut u.choice);
         let point = self.point(at, index, u.point)?;
         let view = at.view(point.leaf)?;
-        then(point, self.density(at, point, &view), &view)
+        let relative = view.point(point.point);
+        then(PlacedPoint { point, relative }, self.density(at, point, &view), &view)
     }
 
     #[inline]
     fn density(&self, at: &Viewpoint<'_>, point: LightPoint, view: &LightView<'_>) -> Density {
-        let Some(triangle) = view.as_portal() else { return Density { pmf: 0.0, pdf: 0.0 } };
+        let none = Density { pmf: 0.0, pdf: 0.0 };
+        let Some(triangle) = view.as_portal() else { return none };
         let direction = triangle.point(point.point).normalize_or_zero().as_vec3();
         let environment = &at.scene.environment;
+        let Some((block, excess)) = environment.feature_at(direction) else { return none };
         let mut pdf = 0.0;
-        for feature in 0..environment.bright_features().len() {
-            let excess = f64::from(environment.feature_excess(feature, direction));
-            if excess == 0.0 {
+        for (visible, weight) in self.entries() {
+            let LightPoint { leaf, point } = point;
+            let node = visible.node as usize;
+            let is_here = visible.leaf == leaf || visible.leaf == ANY_PORTAL;
+            if !is_here || !environment.feature_nodes()[node].holds_block(block) {
                 continue;
             }
-            for (visible, weight) in self.of_feature(feature) {
-                let LightPoint { leaf, point } = point;
-                let per_excess = if visible.leaf == ANY_PORTAL {
-                    let is_least = least_crossed(at, direction).is_some_and(|least| least.leaf == leaf);
-                    if is_least { 1.0 / f64::from(environment.bright_features()[feature].power) } else { 0.0 }
-                } else if visible.leaf == leaf && visible.part.cell.holds(point) {
-                    FeatureView::new(triangle, environment, feature).pdf_per_excess(visible.part, point)
-                } else {
-                    continue;
-                };
-                pdf += f64::from(weight) * excess * per_excess;
-            }
+            let per_excess = if visible.leaf == ANY_PORTAL {
+                let is_least = least_crossed(at, direction).is_some_and(|least| least.leaf == leaf);
+                if is_least { 1.0 / f64::from(environment.feature_nodes()[node].power) } else { 0.0 }
+            } else if visible.part.cell.holds(point) {
+                FeatureView::new(triangle, environment, node).pdf_per_excess(visible.part, point)
+            } else {
+                continue;
+            };
+            pdf += f64::from(weight) * f64::from(excess) * per_excess;
         }
         Density { pmf: 0.0, pdf }
     }

@@ -1,10 +1,10 @@
-//! Bright features through an opening with three straight edges: how much of a feature is visible, and directions into
-//! the visible part.
+//! Bright features through an opening with three straight edges: how much of them is visible, and directions into the
+//! visible part.
 
 use glam::{DVec3, Vec3};
 
 use super::texel_cut::TexelCut;
-use crate::env::{BrightFeature, EnvironmentView};
+use crate::env::{EnvironmentView, FeatureNode, FeatureTexel};
 use crate::warp::Variate;
 
 /// The directions between three planes through the viewer.
@@ -14,15 +14,22 @@ pub(super) struct Opening {
     pub(super) planes: [Vec3; 3],
 }
 
-/// How much of a feature is visible.
+/// How much of a region of directions is visible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Coverage {
-    /// Nothing of the feature.
+    /// Nothing of the region.
     Nothing,
-    /// Perhaps a part of the feature.
+    /// Perhaps a part of the region.
     Part,
-    /// All of the feature.
+    /// All of the region.
     All,
+}
+
+/// A piece of what is visible: all below a node, or a block of texels.
+#[derive(Clone, Copy, Debug)]
+enum Piece<'a> {
+    Node(usize),
+    Texel(&'a FeatureTexel, TexelCut),
 }
 
 impl Opening {
@@ -34,70 +41,91 @@ impl Opening {
         Self { planes: planes.map(|plane| environment.local_direction(inwards(plane))) }
     }
 
-    /// Bounds how much of a feature the opening shows, by the cone around the feature.
+    /// Bounds how much of a node the opening shows, by the cone around the node.
     #[inline]
-    pub(super) fn coverage(&self, feature: &BrightFeature) -> Coverage {
-        let (axis, reach) = (Vec3::from_array(feature.axis), feature.reach());
-        let depths = self.planes.map(|plane| plane.dot(axis));
-        if depths.iter().any(|&depth| depth < -reach) {
+    pub(super) fn coverage(&self, node: &FeatureNode) -> Coverage {
+        let (axis, reach) = (Vec3::from_array(node.axis), node.reach());
+        let [a, b, c] = self.planes.map(|plane| plane.dot(axis));
+        let least = a.min(b).min(c);
+        if least < -reach && reach < 1.0 {
             Coverage::Nothing
-        } else if depths.iter().all(|&depth| depth >= reach) {
+        } else if least >= reach {
             Coverage::All
         } else {
             Coverage::Part
         }
     }
 
-    /// Returns a feature's excess over the cap, integrated over the directions of the opening.
-    pub(super) fn power(&self, environment: &EnvironmentView<'_>, feature: usize) -> f32 {
-        let bright = &environment.bright_features()[feature];
-        match self.coverage(bright) {
-            Coverage::Nothing => 0.0,
-            Coverage::All => bright.power,
-            Coverage::Part => {
-                let texels = environment.feature_texels(feature).iter();
-                let shares = texels.map(|texel| texel.excess * TexelCut::new(texel, self).share());
-                bright.texel_solid_angle() * shares.sum::<f32>()
+    /// Visits what the opening shows below a node, each piece with the excess over the cap integrated over its visible
+    /// directions, until `visit` returns true.
+    #[inline]
+    fn visit<'a>(&self, environment: &EnvironmentView<'a>, node: usize, mut visit: impl FnMut(Piece<'a>, f32) -> bool) {
+        let nodes = environment.feature_nodes();
+        let end = nodes[node].next as usize;
+        let mut at = node;
+        while at < end {
+            let found = &nodes[at];
+            match self.coverage(found) {
+                Coverage::Nothing => at = found.next as usize,
+                Coverage::All => {
+                    if visit(Piece::Node(at), found.power) {
+                        return;
+                    }
+                    at = found.next as usize;
+                }
+                Coverage::Part => {
+                    if environment.is_feature_leaf(at) {
+                        for texel in environment.feature_texels(at) {
+                            let cut = TexelCut::new(texel, self);
+                            if visit(Piece::Texel(texel, cut), texel.power() * cut.share()) {
+                                return;
+                            }
+                        }
+                    }
+                    at += 1;
+                }
             }
         }
     }
 
-    /// Draws a world direction in the visible part of a feature, with a density in proportion to the excess over the
-    /// cap. `power` is [`Self::power`] of the same feature, above zero.
+    /// Returns the excess over the cap below a node, integrated over the directions of the opening.
+    pub(super) fn power(&self, environment: &EnvironmentView<'_>, node: usize) -> f32 {
+        let mut sum = 0.0;
+        self.visit(environment, node, |_, power| {
+            sum += power;
+            false
+        });
+        sum
+    }
+
+    /// Draws a world direction in the visible part of a node, with a density in proportion to the excess over the cap.
+    /// `power` is [`Self::power`] of the same node, above zero.
     ///
-    /// The direction may miss the opening by as much as a texel's margin.
+    /// The direction may miss the opening by as much as a block's margin.
     pub(super) fn sample(
         &self,
         environment: &EnvironmentView<'_>,
-        feature: usize,
+        node: usize,
         power: f32,
         mut u: [Variate; 2],
     ) -> Vec3 {
-        let bright = &environment.bright_features()[feature];
-        if self.coverage(bright) == Coverage::All {
-            return environment.sample_feature(feature, u);
-        }
-        let per_share = bright.texel_solid_angle() / power;
-        let target = u[1].value();
+        let target = u[1].value() * f64::from(power);
         let (mut chosen, mut low, mut width, mut below) = (None, 0.0, 1.0, 0.0);
-        for texel in environment.feature_texels(feature) {
-            let cut = TexelCut::new(texel, self);
-            let share = f64::from(texel.excess * cut.share() * per_share);
-            if share > 0.0 {
-                (chosen, low, width) = (Some((texel, cut)), below, share);
-                below += share;
-                if target < below {
-                    break;
-                }
+        self.visit(environment, node, |piece, power| {
+            if power > 0.0 {
+                (chosen, low, width) = (Some(piece), below, f64::from(power));
+                below += width;
             }
-        }
-        u[1].stretch(target - low, width, 1.0);
+            target < below
+        });
+        u[1].stretch(target - low, width, f64::from(power));
         match chosen {
-            Some((texel, TexelCut::Part(polygon, _))) => {
-                environment.direction_in_texel(feature, texel, polygon.sample(u))
+            Some(Piece::Node(node)) => environment.sample_feature(node, u),
+            Some(Piece::Texel(texel, TexelCut::Part(polygon, _))) => {
+                environment.direction_in_texel(texel, polygon.sample(u))
             }
-            Some((texel, _)) => environment.direction_in_texel(feature, texel, u.map(|u| u.value_f32() - 0.5)),
-            None => environment.sample_feature(feature, u),
+            Some(Piece::Texel(texel, _)) => environment.direction_in_texel(texel, u.map(|u| u.value_f32() - 0.5)),
+            None => environment.sample_feature(node, u),
         }
     }
 }

@@ -28,7 +28,7 @@ fn zoo(pcg: &mut Pcg32) -> Vec<Environment> {
             image[(y + j - side / 2) * SIZE + x + i - side / 2] = 1000.0 + 500.0 * i as f32;
         }
         let environment = Environment::from_equal_area(SIZE, &image, Filter::Nearest).unwrap();
-        assert!(!environment.as_view().bright_features().is_empty(), "{x} {y}");
+        assert!(!environment.as_view().feature_nodes().is_empty(), "{x} {y}");
         environment.with_rotation(any_rotation(pcg)).unwrap()
     };
     places.into_iter().map(sun).collect()
@@ -36,7 +36,7 @@ fn zoo(pcg: &mut Pcg32) -> Vec<Environment> {
 
 /// A triangle with corners in and around a sun.
 fn triangle(view: &EnvironmentView<'_>, pcg: &mut Pcg32) -> [DVec3; 3] {
-    let (axis, radius) = (view.feature_axis(0), view.bright_features()[0].sin_radius);
+    let (axis, radius) = (view.feature_axis(0), view.feature_nodes()[0].sin_radius);
     [0; 3].map(|_| {
         let offset = Vec3::from_array([0; 3].map(|_| 2.0 * pcg.next_f32() - 1.0));
         ((axis + 1.5 * radius * offset) * (1.0 + 3.0 * pcg.next_f32())).as_dvec3()
@@ -62,7 +62,7 @@ fn what_is_seen_is_what_rays_find() {
     let mut pcg = Pcg32::new(5, 41);
     for environment in zoo(&mut pcg) {
         let view = environment.as_view();
-        let power = view.bright_features()[0].power;
+        let power = view.feature_nodes()[0].power;
         for _ in 0..40 {
             let triangle = triangle(&view, &mut pcg);
             let share = f64::from(Opening::new(&view, triangle).power(&view, 0) / power);
@@ -80,7 +80,7 @@ fn nothing_that_is_seen_is_left_out() {
     let mut pcg = Pcg32::new(6, 41);
     for environment in zoo(&mut pcg) {
         let view = environment.as_view();
-        let sun = view.bright_features()[0];
+        let sun = view.feature_nodes()[0];
         for i in 0..20_000 {
             let triangle = triangle(&view, &mut pcg);
             let direction = view.sample_feature(0, variates(&mut pcg, i));
@@ -90,10 +90,9 @@ fn nothing_that_is_seen_is_left_out() {
             let opening = Opening::new(&view, triangle);
             assert!(opening.coverage(&sun) != Coverage::Nothing);
             let point = sphere_to_square(view.rotation().transpose() * direction);
-            let scaled = point * (1_u32 << sun.level) as f32;
-            let number = ((scaled.y as u32) << sun.level) | scaled.x as u32;
-            let texel = view.feature_texels(0).iter().find(|texel| texel.texel == number).expect("a texel of the sun");
-            let place = scaled.fract() - 0.5;
+            let (block, _) = view.feature_at(direction).expect("a block of the sun");
+            let texel = &view.feature_texels(0)[block as usize];
+            let place = (point * (1_u32 << texel.level) as f32).fract() - 0.5;
             match TexelCut::new(texel, &opening) {
                 TexelCut::Nothing => panic!("{direction} is seen"),
                 TexelCut::All => {}
@@ -113,11 +112,11 @@ fn directions_into_what_is_seen() {
             let triangle = triangle(&view, &mut pcg);
             let opening = Opening::new(&view, triangle);
             let power = opening.power(&view, 0);
-            if power < 0.05 * view.bright_features()[0].power {
+            if power < 0.05 * view.feature_nodes()[0].power {
                 continue;
             }
             let direction = opening.sample(&view, 0, power, variates(&mut pcg, i));
-            assert!(view.feature_excess(0, direction) > 0.0);
+            assert!(view.feature_at(direction).is_some());
             drawn += 1;
             missed += u32::from(!is_inside(triangle, direction));
         }

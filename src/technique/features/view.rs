@@ -1,10 +1,10 @@
-//! One bright feature of the environment through one light triangle.
+//! Bright features of the environment through one light triangle.
 
 use glam::Vec3;
 
 use super::opening::{Coverage, Opening};
 use crate::blas::{self, ARITY, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
-use crate::env::{BrightFeature, EnvironmentView};
+use crate::env::{EnvironmentView, FeatureNode};
 use crate::light::{LightViewKind, TriangleView};
 use crate::math;
 use crate::warp::Variate;
@@ -39,20 +39,21 @@ impl FeaturePart {
     pub(super) const WHOLE: Self = Self { cell: LatticeCell::whole(), node: LEAF, power: 0.0 };
 }
 
-/// A feature behind a light triangle: the target by which cells are chosen when the feature is sampled by itself.
+/// A feature, or a group of features, behind a light triangle: the target by which cells are chosen when the feature is
+/// sampled by itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeatureView<'a> {
     /// The triangle as seen from the shading point.
     triangle: &'a TriangleView<'a>,
     /// The environment that holds the feature.
     environment: &'a EnvironmentView<'a>,
-    /// Index of the feature.
-    feature: usize,
+    /// Node of the tree over the features.
+    node: usize,
 }
 
 impl<'a> FeatureView<'a> {
-    pub(super) fn new(triangle: &'a TriangleView<'a>, environment: &'a EnvironmentView<'a>, feature: usize) -> Self {
-        Self { triangle, environment, feature }
+    pub(super) fn new(triangle: &'a TriangleView<'a>, environment: &'a EnvironmentView<'a>, node: usize) -> Self {
+        Self { triangle, environment, node }
     }
 
     /// The directions in which a cell is visible.
@@ -62,7 +63,7 @@ impl<'a> FeatureView<'a> {
 
     /// Power of the feature through a cell, as if the cell's texture were one.
     fn power(&self, cell: LatticeCell) -> f32 {
-        self.opening(cell).power(self.environment, self.feature)
+        self.opening(cell).power(self.environment, self.node)
     }
 
     /// Passes every part of the triangle through which the feature is visible to `found`, with the power through the
@@ -88,7 +89,7 @@ impl<'a> FeatureView<'a> {
             return;
         }
         if below.node == LEAF {
-            let power = opening.power(self.environment, self.feature);
+            let power = opening.power(self.environment, self.node);
             if power * below.average > 0.0 {
                 found(FeaturePart { cell, node: below.node, power }, power * below.average);
             }
@@ -130,8 +131,8 @@ impl<'a> FeatureView<'a> {
     /// Draws a point in a cell of one opacity. `power` is the feature's through the cell, if it is known already.
     fn sample_in(&self, cell: LatticeCell, power: Option<f32>, u: [Variate; 2]) -> Option<Lattice> {
         let opening = self.opening(cell);
-        let power = power.unwrap_or_else(|| opening.power(self.environment, self.feature));
-        let direction = opening.sample(self.environment, self.feature, power, u);
+        let power = power.unwrap_or_else(|| opening.power(self.environment, self.node));
+        let direction = opening.sample(self.environment, self.node, power, u);
         self.triangle.intersect(direction).filter(|point| cell.holds(*point))
     }
 
@@ -149,9 +150,9 @@ impl<'a> FeatureView<'a> {
         })
     }
 
-    /// The feature.
-    fn bright(&self) -> &BrightFeature {
-        &self.environment.bright_features()[self.feature]
+    /// The node of the tree over the features.
+    fn bright(&self) -> &FeatureNode {
+        &self.environment.feature_nodes()[self.node]
     }
 
     /// Whether a cell is so far from the feature's axis that nothing of the feature is visible through it: a quick test

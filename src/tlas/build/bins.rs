@@ -6,17 +6,22 @@ use glam::Vec3A;
 use super::cluster::{Cluster, Item, Units};
 use crate::parallel::reduce;
 
-/// Most bins per axis.
+/// Largest number of bins per axis. *Measured* (docs/ACCURACY.md, "Building without cones"): from 8 to 24 bins the choice is
+/// as good, and each bin costs build time.
 const BINS: usize = 10;
-/// Fewest bins per axis.
+/// Smallest number of bins per axis, for sets of fewer lights than that. More bins than lights stay empty, fewer leave
+/// no choice.
+/// *Measured*: docs/ACCURACY.md, "Constants of the build"; not sensitive.
 const FEWEST_BINS: usize = 4;
-/// Padding of flat boxes, relative to the longest edge of the box that is split.
+/// Padding of flat boxes, relative to the longest edge of the box that is split. Without any, all splits of a flat set
+/// cost nothing; much more would hide thin shapes.
+/// *Measured*: docs/ACCURACY.md, "Constants of the build"; not sensitive.
 const PAD: f32 = 1e-3;
 
 /// A set of lights that is to be split.
 pub(super) struct Extent {
     pub(super) all: Cluster,
-    /// Box around the doubled centres.
+    /// Box around the doubled centers.
     center_low: Vec3A,
     center_high: Vec3A,
     /// The normal that those of two-sided lights are turned to: their sign says nothing.
@@ -24,7 +29,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Of lights, of which there is at least one.
+    /// Measures lights, of which there is at least one.
     pub(super) fn of(items: &[Item]) -> Self {
         let reference = items[0].normal;
         let part = |items: &[Item]| {
@@ -46,12 +51,12 @@ impl Extent {
         })
     }
 
-    /// The axis along which the centres differ most.
+    /// Returns the axis along which the centers differ most.
     pub(super) fn longest_axis(&self) -> usize {
         (self.center_high - self.center_low).max_position()
     }
 
-    /// The cheapest split found, or `None` where all centres coincide.
+    /// Returns the cheapest split found, or `None` where all centers coincide.
     pub(super) fn cheapest_split(&self, items: &[Item]) -> Option<Split> {
         let spread = self.center_high - self.center_low;
         // Few lights leave most bins empty.
@@ -97,7 +102,7 @@ impl Split {
     }
 }
 
-/// Assigns lights to slabs along each axis by their centres.
+/// Assigns lights to slabs along each axis by their centers.
 #[derive(Clone, Copy)]
 struct Binning {
     start: Vec3A,
@@ -141,7 +146,7 @@ impl Binning {
     }
 }
 
-/// Cost of a split in front of each bin that has lights on both sides.
+/// Returns the cost of a split in front of each bin that has lights on both sides.
 fn costs(bins: &[Cluster], units: &Units) -> impl Iterator<Item = (usize, f32)> {
     let mut right_costs = [None; BINS];
     let mut right = Cluster::EMPTY;

@@ -9,6 +9,11 @@ use glam::Vec3A;
 use crate::bounds::{LightBounds, orientation_measure};
 use crate::math;
 
+/// Least squared length of the middle of a box of unit normals. Below it, the normals count as pointing everywhere: the
+/// middle is no direction any more, and dividing by its length would only enlarge rounding. Affects costs alone.
+/// *Measured*: docs/ACCURACY.md, "Constants of the build"; not sensitive.
+const LEAST_MIDDLE2: f32 = 1e-4;
+
 /// A light on its way into the tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
@@ -32,14 +37,14 @@ impl Item {
         }
     }
 
-    /// Twice the centre of the box; coordinates are small enough to be added.
+    /// Returns twice the center of the box; coordinates are small enough to be added.
     #[inline(always)]
     pub(super) fn double_center(&self) -> Vec3A {
         self.low + self.high
     }
 }
 
-/// What the heuristic knows of several lights.
+/// Several lights, as the heuristic sees them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cluster {
     pub(super) low: Vec3A,
@@ -60,7 +65,7 @@ impl Cluster {
         two_sided: false,
     };
 
-    /// Adds a light whose normal has been turned to the side that is wanted.
+    /// Adds a light whose normal has been turned to the wanted side.
     #[inline(always)]
     pub(super) fn add(&mut self, item: &Item, normal: Vec3A) {
         self.low = self.low.min(item.low);
@@ -83,7 +88,7 @@ impl Cluster {
         }
     }
 
-    /// `M_A · M_Ω · energy` of the heuristic.
+    /// Returns `M_A · M_Ω · energy` of the heuristic.
     pub(super) fn cost(&self) -> f32 {
         self.cost_in(&Units { pad: 0.0, per_length: 1.0, per_energy: 1.0 })
     }
@@ -95,13 +100,13 @@ impl Cluster {
         area * orientation_measure(self.least_cos(), self.two_sided) * (self.energy * units.per_energy)
     }
 
-    /// Least cosine of the angle between a normal and the middle of all.
+    /// Returns the least cosine of the angle between a normal and the middle of all.
     #[inline]
     fn least_cos(&self) -> f32 {
         let middle = 0.5 * (self.normal_low + self.normal_high);
         let half = 0.5 * (self.normal_high - self.normal_low);
         let length2 = middle.length_squared();
-        if length2 < 1e-4 {
+        if length2 < LEAST_MIDDLE2 {
             return -1.0;
         }
         let inverse = 1.0 / math::sqrt(length2);
@@ -112,9 +117,9 @@ impl Cluster {
     }
 }
 
-/// What costs are told in, so that they can be compared for lights that are tiny or dark.
+/// Units of costs, which keep the costs of tiny or dark lights apart.
 pub(super) struct Units {
-    /// What edges are made longer by, so that flat boxes still compare.
+    /// Length by which edges are extended, so that flat boxes still compare.
     pub(super) pad: f32,
     pub(super) per_length: f32,
     pub(super) per_energy: f32,

@@ -1,4 +1,4 @@
-//! What is known of a node's children, in the few bits that a node has for it.
+//! Writes bounds and moments of children into the few bits that a node has for them.
 
 use core::f32::consts::FRAC_PI_2;
 
@@ -7,23 +7,36 @@ use glam::{DVec3, Vec3};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, angle};
 use crate::math;
-use crate::tlas::node::{ALL, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
+use crate::tlas::node::{ALL, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
 
-/// Steps along the longest extent of a node. Fewer than a byte can count, as rounding moves centres and widens boxes.
+/// Steps along each extent of a node. *Proved*: a box that fills the node has 253 halves of a step, the rounding of its
+/// center adds one and the rounding up of the halves another, and 255 is the largest code. Fewer steps make all boxes
+/// coarser.
 const BOX_STEPS: f64 = 253.0;
-/// Least widening of a box, in halves of a step: covers the rounding of all that is computed from boxes.
+/// Least widening of a box, in halves of a step. *Proved*: covers the rounding of what is computed from boxes
+/// relative to their size, 2^-22 of 255 steps, hundredfold; rounding relative to the distance is granted by the tests
+/// themselves. A larger one widens boxes without need.
 const BOX_MARGIN: f64 = 1.0 / 32.0;
-/// Least unit of the boxes, so that products with it do not vanish.
+/// Least unit of the boxes. *Proved*: flat boxes divide by it, and any positive number keeps that from being 0 / 0. A much
+/// larger one would widen the boxes of tiny scenes.
 const LEAST_STEP: f64 = 1e-30;
-/// A little shorter than it could be, so that rounding makes no normal longer than one: the test by the cone is then
-/// on the safe side.
+/// Length of normals in steps: shorter than [`NORMAL_STEPS`], so that rounding by half a step in each component makes no
+/// normal longer than one (*proved*: √3 / 2 is below 1). The test by the cone is then on the safe side.
 const NORMAL_SCALE: f32 = NORMAL_STEPS - 1.0;
-/// Widening of a cluster's cone of normals, in radians: covers the rounding of its construction in `f32`.
+/// Widening of a cluster's cone of normals, in radians. Covers the rounding of its construction in `f32`,
+/// about 1e-6 a union. A larger one culls a little less. Chosen with room; `what_is_culled_is_dark` looks for
+/// counterexamples.
 const CONE_MARGIN: f32 = 1e-4;
-/// Widening of the tangent: covers the rounding of the test.
+/// Widening of the tangent. Covers the rounding of the test, about 1e-6 of the distance. A larger one culls a little
+/// less. Chosen with room; `what_is_culled_is_dark` looks for counterexamples.
 const TANGENT_MARGIN: f32 = 2.5e-4;
-/// Half angle from which on a cone counts as a half-space.
+/// Half angle in radians from which on a cone counts as a half-space. *Format*: its tangent, 12.5, must stay below the
+/// largest that a code can hold. A smaller one culls less.
 const WIDEST_CONE: f32 = FRAC_PI_2 - 0.08;
+
+/// Least length of a mean normal that is a direction. Below it the axis of the cone stands in; the length itself is then
+/// stored as zero, *format*: half a step of a byte is 2e-3.
+const LEAST_LENGTH: f32 = 1e-3;
 
 impl<const N: usize> Node<N> {
     /// Writes what is known of all children, in the order of the lanes.
@@ -62,11 +75,11 @@ impl<const N: usize> Node<N> {
 
     fn set_cone(&mut self, lane: usize, bounds: &LightBounds, moments: &Moments) {
         let length = moments.normal.length();
-        let direction = if length > 1e-3 { moments.normal / length } else { bounds.normals.axis };
+        let direction = if length > LEAST_LENGTH { moments.normal / length } else { bounds.normals.axis };
         let code = |value: f32| (value * NORMAL_SCALE + 0.5f32.copysign(value)) as i32;
         let [x, y, z] = direction.to_array().map(|value| code(value) as u32 & 0x3ff);
         let normal = x | y << 10 | z << 20;
-        let side = if bounds.two_sided { TWO_SIDED } else { 0 };
+        let side = if bounds.two_sided { LANE_TWO_SIDED } else { 0 };
         self.normals[lane] = normal | side;
         self.lengths[lane] = (255.0 * length + 0.5) as u8;
         let axis = Vec3::from_array([0, 1, 2].map(|axis| Self::component(normal, axis))).normalize_or_zero();
@@ -96,14 +109,14 @@ impl<const N: usize> Node<N> {
     }
 }
 
-/// The least number of two bytes that is not below a positive one.
+/// Returns the least number of two bytes that is not below a positive one.
 fn rounded_up(value: f64) -> u16 {
     let bits = (value as f32).to_bits();
     let bits = (bits >> 16) as u16;
     if f64::from(wide(bits)) < value { bits + 1 } else { bits }
 }
 
-/// The number of two bytes next to a positive and finite one, and positive as well.
+/// Returns the number of two bytes next to a positive and finite one, and positive as well.
 fn nearest(value: f32) -> u16 {
     let bits = (value.to_bits() + 0x8000) >> 16;
     (bits as u16).clamp(1, 0x7f7f)

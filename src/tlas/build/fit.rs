@@ -21,7 +21,7 @@ struct Subtree<'a, const N: usize> {
     fitted: Fitted,
 }
 
-/// What a node has to know of one of its children.
+/// Summary of a child for the node above it.
 #[derive(Clone, Copy)]
 struct Fitted {
     bounds: LightBounds,
@@ -81,7 +81,7 @@ impl<const N: usize> Subtree<'_, N> {
     }
 }
 
-/// The subtrees below a node. Its child nodes come first, then what is below the first of them, and so on.
+/// Returns the subtrees below a node. Its child nodes come first, then what is below the first of them, and so on.
 fn divide<'a, const N: usize>(
     node: &Node<N>,
     first: usize,

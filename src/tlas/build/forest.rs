@@ -10,19 +10,20 @@ use alloc::vec::Vec;
 use super::binary::BinaryNode;
 use crate::math;
 
-/// What every wide node costs, relative to the mean over all small clusters.
+/// Cost of a wide node, relative to the mean cost of all clusters that fit into one. A larger cost gives fewer and fuller
+/// nodes, a smaller one nodes that mislead less. *Measured* (docs/SPEED.md, "Fewer and fuller nodes").
 const NODE_COST: f32 = 4.0;
 
 /// How to divide one binary node into at most 1, 2 ... `N` lanes.
 #[derive(Clone, Copy)]
 pub(super) struct Forest<const N: usize> {
-    /// What it costs, by the number of lanes less one.
+    /// Least cost, by the number of lanes less one.
     cost: [f32; N],
-    /// Lanes for the left child; none where the node had better stay a single lane.
+    /// Number of lanes for the left child; zero where the node had better stay a single lane.
     left: [u8; N],
 }
 
-/// The cheapest way to divide each node of a binary tree.
+/// Finds the cheapest way to divide each node of a binary tree.
 pub(super) fn forests<const N: usize>(binary: &[BinaryNode]) -> Vec<Forest<N>> {
     let cost = |node: &BinaryNode| math::sqrt(node.cost);
     let small = || binary.iter().filter(|node| node.count > 1 && node.count as usize <= N);
@@ -40,7 +41,8 @@ pub(super) fn forests<const N: usize>(binary: &[BinaryNode]) -> Vec<Forest<N>> {
 }
 
 impl<const N: usize> Forest<N> {
-    /// Of a node from those of its children, which fill at most so many lanes; as a single lane it costs `own` on top.
+    /// Returns the forest of a node from those of its children, which fill at most `most` lanes each; as a single lane the
+    /// node costs `own` on top.
     fn join(left: &Self, right: &Self, most: [usize; 2], own: f32) -> Self {
         let mut all = Self { cost: [f32::INFINITY; N], left: [0; N] };
         for i in 1..=most[0] {
@@ -74,14 +76,14 @@ pub(super) struct LaneCut<const N: usize> {
 }
 
 impl<const N: usize> LaneCut<N> {
-    /// Of the wide node made of a binary one.
+    /// Finds the lanes of the wide node made of a binary one.
     pub(super) fn new(binary: &[BinaryNode], forests: &[Forest<N>], root: usize) -> Self {
         let mut cut = Self { lanes: [0; N], width: 0 };
         cut.divide(binary, forests, root, N);
         cut
     }
 
-    /// Members, as indices of binary nodes.
+    /// Returns the members, as indices of binary nodes.
     pub(super) fn members(&self) -> &[usize] {
         &self.lanes[..self.width]
     }

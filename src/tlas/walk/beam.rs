@@ -3,15 +3,11 @@
 
 use glam::Vec3;
 
-use super::importance::clamped_mean;
+use super::importance::{NORMAL_VARIANCE_SHARE, clamped_mean};
+use crate::receiver::LEAST_CLUSTER_COSINE;
 use crate::tlas::node::{Child, Node};
 use crate::tlas::tree::WideTree;
 use crate::warp::{Variate, keep_possible, pick, pmf, sum};
-
-/// Of the spread of a cluster's normals, what counts as variance of a cosine.
-const NORMAL_SHARE: f32 = 0.4;
-/// Cosine granted to clusters that are seen edge-on.
-const LEAST_COSINE: f32 = 1e-3;
 
 /// Which light leaves.
 #[derive(Clone, Copy, Debug)]
@@ -29,12 +25,12 @@ pub(crate) struct Beam {
     pub(crate) direction: Vec3,
     /// Sine and cosine of its half angle.
     pub(crate) spread: [f32; 2],
-    /// Whether portals are told apart from emitters: where the environment is an image.
+    /// Whether portals are distinguished from emitters: where the environment is an image.
     pub(crate) portals_apart: bool,
 }
 
 impl Beam {
-    /// Area of a cluster perpendicular to the beam, relative to its area: zero only if all of it is seen from
+    /// Returns the area of a cluster perpendicular to the beam, relative to its area: zero only if all of it is seen from
     /// behind.
     #[inline]
     pub(crate) fn projection(&self, axis: Vec3, [sin, cos]: [f32; 2], normal: Vec3, two_sided: bool) -> f32 {
@@ -45,13 +41,13 @@ impl Beam {
             return 0.0;
         }
         let facing = normal.dot(self.direction);
-        let variance = NORMAL_SHARE * (1.0 - normal.length_squared()).max(0.0) + sin_r * sin_r * (1.0 / 3.0);
-        clamped_mean(if two_sided { facing.abs() } else { facing }, variance).max(LEAST_COSINE)
+        let variance = NORMAL_VARIANCE_SHARE * (1.0 - normal.length_squared()).max(0.0) + sin_r * sin_r * (1.0 / 3.0);
+        clamped_mean(if two_sided { facing.abs() } else { facing }, variance).max(LEAST_CLUSTER_COSINE)
     }
 }
 
 impl<const N: usize> Node<N> {
-    /// What every child sends out. All zero where nothing does.
+    /// Returns what every child sends out. All zero where nothing does.
     fn outgoing(&self, outgoing: &Outgoing) -> [f32; N] {
         let [flux, portal] = self.energies();
         let mut weights = match outgoing {
@@ -93,12 +89,12 @@ impl<const N: usize> WideTree<'_, N> {
         }
     }
 
-    /// Probability with which [`Self::sample_outgoing`] draws a leaf.
+    /// Returns the probability with which [`Self::sample_outgoing`] draws a leaf.
     pub(crate) fn pmf_outgoing(&self, leaf: u32, outgoing: &Outgoing) -> f64 {
         self.path(leaf).map(|(node, lane)| pmf(&self.nodes[node].outgoing(outgoing), lane)).product()
     }
 
-    /// What all leaves send out, in units of the sum of their energies; `None` for a tree without nodes.
+    /// Returns what all leaves send out, in units of the sum of their energies; `None` for a tree without nodes.
     pub(crate) fn outgoing(&self, outgoing: &Outgoing) -> Option<f32> {
         self.nodes.first().map(|root| root.outgoing(outgoing).iter().sum())
     }

@@ -1,15 +1,16 @@
 //! From the root to a leaf, and from a leaf back to the root: the same weights decide both.
 
-use super::importance::{LeafOracle, ReceiverLanes};
-use crate::receiver::ShadingPoint;
+use super::importance::LeafOracle;
+use crate::receiver::ReceiverLanes;
 use crate::simd::{InstructionSet, Kernel, prefetch};
 use crate::tlas::arity::MAX_LANES;
 use crate::tlas::node::{Child, Node};
 use crate::tlas::tree::WideTree;
 use crate::warp::{Variate, pick_wide, pmf_wide};
 
-/// Walks that take turns: enough to hide what one waits for, few enough to stay in the cache.
-pub(crate) const TURNS: usize = 8;
+/// Number of walks that are interleaved. Fewer hide less of the waiting for memory, more leave the cache. Affects time
+/// alone. Chosen; see docs/SPEED.md on `sample_many`.
+pub(crate) const INTERLEAVED: usize = 8;
 
 /// A way down the tree, as far as it has got.
 pub(crate) struct Descent<S> {
@@ -24,13 +25,13 @@ pub(crate) struct Descent<S> {
 }
 
 impl<S: LeafOracle> Descent<S> {
-    /// From the root.
+    /// Starts at the root.
     #[inline(always)]
-    pub(crate) fn new(x: &ShadingPoint, oracle: S, u: Variate) -> Self {
-        Self { receiver: ReceiverLanes::new(x), oracle, u, node: 0, pmf: 1.0, end: None }
+    pub(crate) fn new(oracle: S, u: Variate) -> Self {
+        Self { receiver: oracle.shading_point().lanes(), oracle, u, node: 0, pmf: 1.0, end: None }
     }
 
-    /// The leaf that was drawn, with its probability.
+    /// Returns the leaf that was drawn, with its probability.
     #[inline(always)]
     pub(crate) fn leaf(&self) -> Option<(u32, f64)> {
         self.end.flatten().map(|leaf| (leaf, self.pmf))
@@ -98,8 +99,8 @@ impl<const N: usize, S: LeafOracle> Kernel for SampleWalk<'_, N, S> {
     }
 }
 
-/// Several ways down, one step each in turn, and each step in two halves: while one way waits for memory or for sums,
-/// the others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
+/// Several ways down, interleaved by steps, and each step in two halves: while one way waits for memory or for sums, the
+/// others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
 struct InterleavedWalks<'a, const N: usize, S> {
     tlas: &'a WideTree<'a, N>,
     walks: &'a mut [Descent<S>],
@@ -110,8 +111,8 @@ impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
 
     #[inline(always)]
     fn run(self) {
-        for walks in self.walks.chunks_mut(TURNS) {
-            let mut weights = [[0.0; N]; TURNS];
+        for walks in self.walks.chunks_mut(INTERLEAVED) {
+            let mut weights = [[0.0; N]; INTERLEAVED];
             let mut going = true;
             while going {
                 for (walk, weights) in walks.iter().zip(&mut weights).filter(|(walk, _)| walk.end.is_none()) {
@@ -128,11 +129,10 @@ impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
     }
 }
 
-/// The way back from a leaf: the probability that [`SampleWalk`] takes it.
+/// The way back from a leaf: the probability that [`SampleWalk`] draws it.
 pub(in crate::tlas) struct PmfWalk<'a, const N: usize, S> {
     pub(in crate::tlas) tlas: &'a WideTree<'a, N>,
     pub(in crate::tlas) leaf: u32,
-    pub(in crate::tlas) x: &'a ShadingPoint,
     pub(in crate::tlas) oracle: &'a S,
     /// Weights of the root, if they are known.
     pub(in crate::tlas) first: Option<&'a FirstWeights>,
@@ -145,7 +145,7 @@ impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
     fn run(self) -> f64 {
         // The way is short to find, but its nodes are far apart in memory.
         self.tlas.path(self.leaf).for_each(|(node, _)| prefetch(&self.tlas.nodes[node]));
-        let receiver = ReceiverLanes::new(self.x);
+        let receiver = self.oracle.shading_point().lanes();
         let mut pmf = 1.0;
         // Not a fold, whose closure would be compiled for the baseline.
         for (node, lane) in self.tlas.path(self.leaf) {
@@ -161,7 +161,6 @@ impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
 /// The weights of one node.
 struct NodeWeights<'a, const N: usize, S> {
     node: &'a Node<N>,
-    x: &'a ShadingPoint,
     oracle: &'a S,
 }
 
@@ -170,14 +169,14 @@ impl<const N: usize, S: LeafOracle> Kernel for NodeWeights<'_, N, S> {
 
     #[inline(always)]
     fn run(self) -> [f32; N] {
-        self.node.weights(&ReceiverLanes::new(self.x), self.oracle)
+        self.node.weights(&self.oracle.shading_point().lanes(), self.oracle)
     }
 }
 
 impl<const N: usize> Node<N> {
-    /// Weight of every child.
-    pub(in crate::tlas) fn weigh(&self, x: &ShadingPoint, oracle: &impl LeafOracle) -> [f32; N] {
-        InstructionSet::best().run(NodeWeights { node: self, x, oracle })
+    /// Returns the weight of every child.
+    pub(in crate::tlas) fn weigh(&self, oracle: &impl LeafOracle) -> [f32; N] {
+        InstructionSet::best().run(NodeWeights { node: self, oracle })
     }
 }
 
@@ -186,13 +185,12 @@ impl<const N: usize> WideTree<'_, N> {
     /// that `u` leads to. `first` are [`Self::first_weights`], if they are known.
     pub(crate) fn sample(
         &self,
-        x: &ShadingPoint,
         oracle: &impl LeafOracle,
         first: Option<&FirstWeights>,
         u: Variate,
     ) -> Option<(u32, f64)> {
         let Some(root) = self.nodes.first() else { return self.single_leaf(oracle).then_some((0, 1.0)) };
-        let mut walk = Descent::new(x, oracle, u);
+        let mut walk = Descent::new(oracle, u);
         if let Some(weights) = first {
             walk.choose(root, &weights.lanes());
         }
@@ -203,15 +201,14 @@ impl<const N: usize> WideTree<'_, N> {
     pub(in crate::tlas) fn sample_below(
         &self,
         node: usize,
-        x: &ShadingPoint,
         oracle: &impl LeafOracle,
         u: Variate,
     ) -> Option<(u32, f64)> {
-        let walk = Descent { node: node as u32, ..Descent::new(x, oracle, u) };
+        let walk = Descent { node: node as u32, ..Descent::new(oracle, u) };
         InstructionSet::best().run(SampleWalk { tlas: self, walk })
     }
 
-    /// As many calls of [`Self::sample`], of which each walk then holds what was drawn.
+    /// Draws a leaf for each walk, which then holds it.
     pub(crate) fn sample_many(&self, walks: &mut [Descent<impl LeafOracle>]) {
         if self.nodes.is_empty() {
             for walk in walks {
@@ -222,24 +219,18 @@ impl<const N: usize> WideTree<'_, N> {
         InstructionSet::best().run(InterleavedWalks { tlas: self, walks });
     }
 
-    /// Probability with which [`Self::sample`] draws a leaf.
-    pub(crate) fn pmf(
-        &self,
-        leaf: u32,
-        x: &ShadingPoint,
-        oracle: &impl LeafOracle,
-        first: Option<&FirstWeights>,
-    ) -> f64 {
+    /// Returns the probability with which [`Self::sample`] draws a leaf.
+    pub(crate) fn pmf(&self, leaf: u32, oracle: &impl LeafOracle, first: Option<&FirstWeights>) -> f64 {
         if self.nodes.is_empty() {
             return if self.single_leaf(oracle) { 1.0 } else { 0.0 };
         }
-        InstructionSet::best().run(PmfWalk { tlas: self, leaf, x, oracle, first })
+        InstructionSet::best().run(PmfWalk { tlas: self, leaf, oracle, first })
     }
 
-    /// Weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
+    /// Returns the weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
     /// energies; `None` for a tree without nodes.
-    pub(crate) fn first_weights(&self, x: &ShadingPoint, oracle: &impl LeafOracle) -> Option<FirstWeights> {
-        self.nodes.first().map(|root| FirstWeights::new(root.weigh(x, oracle)))
+    pub(crate) fn first_weights(&self, oracle: &impl LeafOracle) -> Option<FirstWeights> {
+        self.nodes.first().map(|root| FirstWeights::new(root.weigh(oracle)))
     }
 
     /// Whether the tree is a single leaf, and that leaf visible.

@@ -8,12 +8,15 @@
 use glam::Vec3;
 
 use crate::math::{self, at_least, only_if};
-use crate::receiver::{Receiver, ShadingPoint};
-use crate::tlas::node::{ALL, Child, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
+use crate::receiver::{LEAST_CLUSTER_COSINE, ReceiverLanes, ShadingPoint};
+use crate::tlas::node::{ALL, Child, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
 use crate::warp::{keep_least, within_range};
 
 /// What the tree asks of the level above about its leaves and about what they show.
 pub(crate) trait LeafOracle {
+    /// Returns the shading point that the tree is walked for.
+    fn shading_point(&self) -> &ShadingPoint;
+
     /// Writes mean radiances, relative to the mean over all directions, of what portals show in the directions from the
     /// shading point to balls with these centers (by axis, relative to the shading point) and radii. A radiance is zero
     /// only where all of it is black. All slices are of one length. Only the elements in `set`, a set of bits, are asked
@@ -29,6 +32,11 @@ pub(crate) trait LeafOracle {
 
 impl<O: LeafOracle> LeafOracle for &O {
     #[inline(always)]
+    fn shading_point(&self) -> &ShadingPoint {
+        (**self).shading_point()
+    }
+
+    #[inline(always)]
     fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
         (**self).radiances(centers, radii, set, radiances);
     }
@@ -39,59 +47,24 @@ impl<O: LeafOracle> LeafOracle for &O {
     }
 }
 
-/// Least expected cosine of a cluster that is not culled.
-const LEAST_COSINE: f32 = 1e-3;
-/// Relative error granted to the dot products that decide on culling.
-const ROUNDING: f32 = 1e-5;
+/// Cosine at the lights up to which a single triangle is asked for whether it is visible. *Proved*: covers the rounding
+/// of normals, at most √3 / 2 of 1 / 510. A larger one only asks more often.
+const EDGE_COSINE: f32 = 3e-3;
+/// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
+const LEAST_DISTANCE2: f32 = 1e-30;
 
-/// Cosine at the lights up to which a single triangle may be seen edge-on: covers the rounding of normals.
-const EDGE: f32 = 3e-3;
-/// Least squared distance, so that nothing overflows.
-const LEAST_SQUARED: f32 = 1e-30;
+// How much of each variance counts. Measured: docs/ACCURACY.md, "Moments".
 
-// How much of a variance counts, found by experiment: docs/ACCURACY.md.
+/// Share of the normals' variance, along the line of sight.
+pub(super) const NORMAL_VARIANCE_SHARE: f32 = 0.4;
+/// Share of the positions' variance, for the cosine at the lights.
+const EMITTER_VARIANCE_SHARE: f32 = 1.0 / 3.0;
+/// Share of the positions' variance, for the cosine at the receiver.
+const RECEIVER_VARIANCE_SHARE: f32 = 0.8;
+/// Share of the positions' variance, for the squared distance.
+const DISTANCE_VARIANCE_SHARE: f32 = 0.3;
 
-/// Of the normals' variance, along the line of sight.
-const NORMAL_SHARE: f32 = 0.4;
-/// Of the positions' variance, for the cosine at the lights.
-const EMITTER_SHARE: f32 = 1.0 / 3.0;
-/// Of the positions' variance, for the cosine at the receiver.
-const RECEIVER_SHARE: f32 = 0.8;
-/// Of the positions' variance, for the squared distance.
-const DISTANCE_SHARE: f32 = 0.3;
-
-/// A shading point, as the loop over lanes wants it.
-pub(super) struct ReceiverLanes {
-    position: Vec3,
-    /// What the cosine at the receiver is taken with; zero in a medium.
-    normal: Vec3,
-    /// Bits of the cosine that count: all but its sign, where both sides receive.
-    cosine_bits: u32,
-    /// Least cosine at the receiver; 1 in a medium, where it replaces the cosine.
-    least_cosine: f32,
-    /// The normal of the horizon, and one for no horizon.
-    horizon: Vec3,
-    lift: f32,
-    /// Rounding granted to heights over the horizon, relative to distances.
-    slack: f32,
-}
-
-impl ReceiverLanes {
-    #[inline(always)]
-    pub(super) fn new(x: &ShadingPoint) -> Self {
-        let position = x.position;
-        let (all, unsigned) = (u32::MAX, u32::MAX >> 1);
-        let (normal, cosine_bits, least_cosine, horizon, lift) = match x.receiver {
-            Receiver::Surface(normal) => (normal, all, LEAST_COSINE, normal, 0.0),
-            Receiver::Transmissive(normal) => (normal, unsigned, LEAST_COSINE, Vec3::ZERO, 1.0),
-            Receiver::Volume => (Vec3::ZERO, all, 1.0, Vec3::ZERO, 1.0),
-        };
-        let slack = ROUNDING * horizon.abs().element_sum();
-        Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack }
-    }
-}
-
-/// Weights of a node's children before the level above was asked anything.
+/// Weights of a node's children before the oracle was asked anything.
 struct Estimates<const N: usize> {
     /// Zero where nothing can arrive.
     weights: [f32; N],
@@ -102,7 +75,7 @@ struct Estimates<const N: usize> {
 }
 
 impl<const N: usize> Node<N> {
-    /// Weight of every child. All zero where nothing below the node can be visible.
+    /// Returns the weight of every child. All zero where nothing below the node can be visible.
     #[inline(always)]
     pub(super) fn weights(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
         let Estimates { mut weights, mut largest, doubtful } = self.estimates(x);
@@ -116,7 +89,7 @@ impl<const N: usize> Node<N> {
         weights
     }
 
-    /// Asks the level above about leaves in doubt, and returns the bits of the largest weight.
+    /// Asks the oracle about leaves in doubt, and returns the bits of the largest weight.
     #[inline(never)]
     fn ask(&self, oracle: &impl LeafOracle, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
         while doubtful != 0 {
@@ -158,7 +131,7 @@ impl<const N: usize> Node<N> {
         largest
     }
 
-    /// The geometry of all lanes, in one plain loop over arrays that a compiler can turn into vectors.
+    /// Estimates all lanes, in one plain loop over arrays that a compiler can turn into vectors.
     #[inline(always)]
     fn estimates(&self, x: &ReceiverLanes) -> Estimates<N> {
         let (normals, energies, centers, halves) = (self.normals, self.energies, self.centers, self.halves);
@@ -188,7 +161,7 @@ impl<const N: usize> Node<N> {
             let radius = math::sqrt(radius2);
             let code = f32::from(tangents[i]);
             let tangent = code * code * (1.0 / (TANGENT_STEPS * TANGENT_STEPS));
-            // In steps of the axis. Squared, for want of a root of the distance across.
+            // In steps of the axis. Squared, to avoid a square root.
             let across2 = at_least(NORMAL_STEPS * NORMAL_STEPS * distance2 - along * along, 0.0);
             let beyond = along - axis.abs().dot(half) - tangent * NORMAL_STEPS * radius;
             let away = (beyond > 0.0) & (beyond * beyond > tangent * tangent * across2) & (code < f32::from(WIDE));
@@ -199,7 +172,7 @@ impl<const N: usize> Node<N> {
             let deviation = f32::from(deviations[i]);
             let length = f32::from(lengths[i]);
             let variance = deviation * deviation * (1.0 / (255.0 * 255.0)) * radius2;
-            let squared = at_least(to_mean.length_squared() + DISTANCE_SHARE * variance, LEAST_SQUARED);
+            let squared = at_least(to_mean.length_squared() + DISTANCE_VARIANCE_SHARE * variance, LEAST_DISTANCE2);
             let (inverse2, distance) = (1.0 / squared, math::sqrt(squared));
             // No point of the box is farther than this.
             let slack = x.slack * (distance + 2.0 * radius);
@@ -207,24 +180,24 @@ impl<const N: usize> Node<N> {
             let energy = wide(energies[i]);
             let culled = below | away | (energy == 0.0);
             let side = f32::from_bits(normal.dot(to_mean).to_bits() & x.cosine_bits);
-            let receiver = at_least(clamped_mean(side, RECEIVER_SHARE * variance), x.least_cosine * distance);
+            let receiver = at_least(clamped_mean(side, RECEIVER_VARIANCE_SHARE * variance), x.least_cosine * distance);
             let facing = length * (-1.0 / (255.0 * NORMAL_STEPS)) * axis.dot(to_mean);
-            let facing = f32::from_bits(facing.to_bits() & !(bits & TWO_SIDED));
-            let loss = NORMAL_SHARE - length * length * (NORMAL_SHARE / (255.0 * 255.0));
-            let spread = loss * squared + EMITTER_SHARE * variance;
-            let emitter = at_least(clamped_mean(facing, spread), LEAST_COSINE * distance);
+            let facing = f32::from_bits(facing.to_bits() & !(bits & LANE_TWO_SIDED));
+            let loss = NORMAL_VARIANCE_SHARE - length * length * (NORMAL_VARIANCE_SHARE / (255.0 * 255.0));
+            let spread = loss * squared + EMITTER_VARIANCE_SHARE * variance;
+            let emitter = at_least(clamped_mean(facing, spread), LEAST_CLUSTER_COSINE * distance);
             let term = (receiver * inverse2) * emitter * inverse2;
 
             weights[i] = only_if(!culled, within_range(energy * term));
             largest = largest.max(weights[i].to_bits());
-            doubtful |= u32::from((straddles | (facing < EDGE * distance)) & !culled) << i;
+            doubtful |= u32::from((straddles | (facing < EDGE_COSINE * distance)) & !culled) << i;
         }
         let leaves = self.children() & (u32::MAX << self.node_count);
         Estimates { weights, largest, doubtful: doubtful & leaves }
     }
 }
 
-/// Expectation of `max(0, X)` for a normal variable of this mean and variance, within 4 % of the standard deviation:
+/// Returns the expectation of `max(0, X)` for a normal variable of this mean and variance, within 4 % of the standard deviation:
 /// exact at a mean of zero and far from it.
 #[inline(always)]
 pub(super) fn clamped_mean(mean: f32, variance: f32) -> f32 {

@@ -12,11 +12,10 @@ mod split;
 use glam::Vec3;
 
 pub(crate) use beam::{Beam, Outgoing};
-pub(crate) use descend::{Descent, FirstWeights, TURNS};
+pub(crate) use descend::{Descent, FirstWeights, INTERLEAVED};
 pub(crate) use importance::LeafOracle;
 pub use split::Splitting;
 
-use crate::receiver::ShadingPoint;
 use crate::tlas::arity::Arity;
 use crate::tlas::tree::{TlasView, for_arity};
 use crate::warp::Variate;
@@ -27,12 +26,11 @@ impl TlasView<'_> {
     #[inline]
     pub(crate) fn sample(
         &self,
-        x: &ShadingPoint,
         oracle: &impl LeafOracle,
         first: Option<&FirstWeights>,
         u: Variate,
     ) -> Option<(u32, f64)> {
-        for_arity!(self, tree => tree.sample(x, oracle, first, u))
+        for_arity!(self, tree => tree.sample(oracle, first, u))
     }
 
     /// Draws a leaf for each descent, as [`Self::sample`] does without `first`. Each descent then holds what was drawn.
@@ -42,20 +40,14 @@ impl TlasView<'_> {
 
     /// Returns the probability with which [`Self::sample`] draws a leaf.
     #[inline]
-    pub(crate) fn pmf(
-        &self,
-        leaf: u32,
-        x: &ShadingPoint,
-        oracle: &impl LeafOracle,
-        first: Option<&FirstWeights>,
-    ) -> f64 {
-        for_arity!(self, tree => tree.pmf(leaf, x, oracle, first))
+    pub(crate) fn pmf(&self, leaf: u32, oracle: &impl LeafOracle, first: Option<&FirstWeights>) -> f64 {
+        for_arity!(self, tree => tree.pmf(leaf, oracle, first))
     }
 
     /// Returns the weights of the root's children; `None` for a tree without nodes.
     #[inline]
-    pub(crate) fn first_weights(&self, x: &ShadingPoint, oracle: &impl LeafOracle) -> Option<FirstWeights> {
-        for_arity!(self, tree => tree.first_weights(x, oracle))
+    pub(crate) fn first_weights(&self, oracle: &impl LeafOracle) -> Option<FirstWeights> {
+        for_arity!(self, tree => tree.first_weights(oracle))
     }
 
     /// Draws a leaf from every part of the tree that splitting visits, each with the density of its kind among all
@@ -63,25 +55,18 @@ impl TlasView<'_> {
     #[inline]
     pub(crate) fn sample_split(
         &self,
-        x: &ShadingPoint,
         oracle: &impl LeafOracle,
         splitting: &Splitting,
         variate: impl FnMut(u32) -> Variate,
         visit: impl FnMut(u32, f64),
     ) {
-        for_arity!(self, tree => tree.sample_split(x, oracle, splitting, variate, visit));
+        for_arity!(self, tree => tree.sample_split(oracle, splitting, variate, visit));
     }
 
     /// Returns the expected number of times that [`Self::sample_split`] visits a leaf.
     #[inline]
-    pub(crate) fn expected_count(
-        &self,
-        leaf: u32,
-        x: &ShadingPoint,
-        oracle: &impl LeafOracle,
-        splitting: &Splitting,
-    ) -> f64 {
-        for_arity!(self, tree => tree.expected_count(leaf, x, oracle, splitting))
+    pub(crate) fn expected_count(&self, leaf: u32, oracle: &impl LeafOracle, splitting: &Splitting) -> f64 {
+        for_arity!(self, tree => tree.expected_count(leaf, oracle, splitting))
     }
 
     /// Draws a leaf by what it sends out. Returns it with its probability. A tree of one leaf gives that leaf.

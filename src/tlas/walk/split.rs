@@ -15,8 +15,8 @@ pub struct Splitting {
     /// From 0 (never) to 1 (always): a node is split where `(1 + σ)^-1/4` lies below, with σ the standard deviation
     /// of its contribution relative to the whole tree's.
     pub threshold: f32,
-    /// Levels of the tree, counted from the root, that may be split. A tree of arity `N` gives at most
-    /// `N^levels` samples.
+    /// Levels of the tree, counted from the root, that may be split. A tree of [arity](crate::Arity) `N` gives
+    /// at most `N^levels` samples.
     pub levels: u32,
 }
 
@@ -34,7 +34,7 @@ impl Default for Splitting {
     }
 }
 
-/// The measure's frame: distances count in units of the distance to the tree as a whole.
+/// Frame of the measure: distances are in units of the distance to the tree as a whole.
 struct Measure {
     threshold: f32,
     inverse_scale2: f32,
@@ -45,7 +45,6 @@ impl<const N: usize> WideTree<'_, N> {
     /// drawn: `visit(leaf, expected count)`. `variate(i)` gives the number that the i-th draw is made with.
     pub(crate) fn sample_split(
         &self,
-        x: &ShadingPoint,
         oracle: &impl LeafOracle,
         splitting: &Splitting,
         mut variate: impl FnMut(u32) -> Variate,
@@ -57,6 +56,7 @@ impl<const N: usize> WideTree<'_, N> {
             }
             return;
         }
+        let x = oracle.shading_point();
         let measure = self.measure(x, splitting);
         let mut draws = 0;
         // Depth first through the split nodes, without a stack: from a finished node on to the next lane above it.
@@ -65,9 +65,9 @@ impl<const N: usize> WideTree<'_, N> {
         let mut weights = [0.0; N];
         loop {
             if arriving && depth < splitting.levels && self.is_split(node, x, &measure) {
-                weights = self.nodes[node].weigh(x, oracle);
+                weights = self.nodes[node].weigh(oracle);
             } else if arriving {
-                if let Some((leaf, count)) = self.sample_below(node, x, oracle, variate(draws)) {
+                if let Some((leaf, count)) = self.sample_below(node, oracle, variate(draws)) {
                     visit(leaf, count);
                 }
                 draws += 1;
@@ -77,7 +77,7 @@ impl<const N: usize> WideTree<'_, N> {
             if lane == N {
                 let Some((parent, from)) = self.parent(node) else { return };
                 (node, lane, depth) = (parent, from + 1, depth - 1);
-                weights = self.nodes[node].weigh(x, oracle);
+                weights = self.nodes[node].weigh(oracle);
                 continue;
             }
             match self.nodes[node].child(lane) {
@@ -93,23 +93,18 @@ impl<const N: usize> WideTree<'_, N> {
         }
     }
 
-    /// Expected number of times that [`Self::sample_split`] visits a leaf.
-    pub(crate) fn expected_count(
-        &self,
-        leaf: u32,
-        x: &ShadingPoint,
-        oracle: &impl LeafOracle,
-        splitting: &Splitting,
-    ) -> f64 {
+    /// Returns the expected number of times that [`Self::sample_split`] visits a leaf.
+    pub(crate) fn expected_count(&self, leaf: u32, oracle: &impl LeafOracle, splitting: &Splitting) -> f64 {
         if self.nodes.is_empty() {
-            return self.pmf(leaf, x, oracle, None);
+            return self.pmf(leaf, oracle, None);
         }
+        let x = oracle.shading_point();
         let measure = self.measure(x, splitting);
         let height = self.path(leaf).count() as u32;
         // A node splits only below split nodes: `count` assumes that all above do, `pmf` that none does.
         let (mut count, mut pmf) = (1.0, 1.0);
         for (i, (node, lane)) in (0..).zip(self.path(leaf)) {
-            let share = warp::pmf_wide(&self.nodes[node].weigh(x, oracle), lane);
+            let share = warp::pmf_wide(&self.nodes[node].weigh(oracle), lane);
             pmf *= share;
             let depth = height - 1 - i;
             if !(depth < splitting.levels && self.is_split(node, x, &measure)) {
@@ -146,7 +141,7 @@ impl<const N: usize> WideTree<'_, N> {
         quality < measure.threshold
     }
 
-    /// Least and largest distance from a point to the boxes of a node's children.
+    /// Returns the least and largest distance from a point to the boxes of a node's children.
     fn distances(&self, node: usize, x: &ShadingPoint) -> (f32, f32) {
         let node = &self.nodes[node];
         let (low, high) = node.corners();

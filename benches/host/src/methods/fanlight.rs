@@ -5,7 +5,7 @@
 //! as a second technique.
 
 use fanlight::{
-    Environment, Filter, Hit, LightSampler, Mesh, PointSampler, ShadingPoint, Texture, TriangleId, Weight, Wrap,
+    Environment, Filter, Hit, LightSampler, Mesh, MeshId, PointSampler, ShadingPoint, Texture, TriangleId, Weight, Wrap,
 };
 use glam::Vec3;
 
@@ -37,7 +37,7 @@ impl Fanlight {
         if let Some(sky) = &scene.sky {
             let environment =
                 Environment::from_lat_long(sky.image().width, sky.image().height, &sky.luminance(), Filter::Bilinear)?;
-            builder.environment(environment.with_rotation(sky.rotation())?);
+            builder = builder.environment(environment.with_rotation(sky.rotation())?);
         }
         for emitter in &scene.emitters {
             let mesh = Mesh::emitter(&emitter.mesh.positions, &emitter.mesh.indices);
@@ -53,7 +53,7 @@ impl Fanlight {
         for portal in &scene.portals {
             builder.add_mesh(&Mesh::portal(&portal.mesh.positions, &portal.mesh.indices))?;
         }
-        let ids = world.emitters.iter().map(|e| TriangleId { mesh: e.mesh, triangle: e.triangle });
+        let ids = world.emitters.iter().map(|e| TriangleId::new(MeshId::from_index(e.mesh), e.triangle));
         let starts = scene.emitters.iter().scan(0, |next, emitter| {
             let first = *next;
             *next += emitter.mesh.indices.len() as u32;
@@ -96,8 +96,8 @@ impl LightsHere for Here<'_> {
         if self.fanlight.has_lights
             && let Some(sample) = self.lights.sample(random.uniform3())
         {
-            let TriangleId { mesh, triangle } = sample.hit.triangle;
-            let (target, pdf) = match self.fanlight.starts.get(mesh as usize) {
+            let TriangleId { mesh, triangle, .. } = sample.hit.triangle;
+            let (target, pdf) = match self.fanlight.starts.get(mesh.index() as usize) {
                 Some(first) => {
                     let barycentrics = sample.hit.barycentrics;
                     let point = EmitterPoint { triangle: first + triangle, barycentrics, position: sample.position };
@@ -121,6 +121,6 @@ impl LightsHere for Here<'_> {
     #[inline]
     fn emitter_pdf(&self, point: &EmitterPoint, _: Vec3) -> f32 {
         let triangle = self.fanlight.ids[point.triangle as usize];
-        self.lights.pdf(&Hit { triangle, barycentrics: point.barycentrics })
+        self.lights.pdf(&Hit::new(triangle, point.barycentrics))
     }
 }

@@ -8,23 +8,10 @@ use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::receiver::{Receiver, ShadingPoint};
 use crate::testing::Pcg32;
+use crate::tlas::Arity;
 use crate::tlas::node::{Child, Node};
-use crate::tlas::tests::build;
+use crate::tlas::tests::{build, open};
 use crate::tlas::tree::WideTree;
-use crate::tlas::{Arity, LeafOracle};
-
-/// Everything is visible.
-struct Open;
-
-impl LeafOracle for Open {
-    fn radiances(&self, _centers: [&[f32]; 3], _radii: &[f32], _set: u32, radiances: &mut [f32]) {
-        radiances.fill(1.0);
-    }
-
-    fn is_visible(&self, _leaf: u32) -> bool {
-        true
-    }
-}
 
 /// Small lights in a cube, some of them flat, all facing about the same way if `narrow`.
 fn lights(n: usize, place: Vec3, scale: f32, narrow: bool, pcg: &mut Pcg32) -> Vec<(LightBounds, Moments)> {
@@ -88,7 +75,7 @@ fn is_dark(bounds: &LightBounds, x: &ShadingPoint) -> bool {
 
 /// Checks all leaves below a node. Returns how many lanes were culled.
 fn check(tlas: &WideTree<'_, 8>, node: usize, culled: bool, x: &ShadingPoint, dark: &dyn Fn(u32) -> bool) -> usize {
-    let weights = tlas.nodes[node].weigh(x, &Open);
+    let weights = tlas.nodes[node].weigh(&open(x));
     let mut count = 0;
     for (lane, &weight) in weights.iter().enumerate() {
         let culled = culled || weight == 0.0;
