@@ -4,9 +4,10 @@
 //! exact in an `f32`, and so is every step of a descent: a point is drawn in the cell that a lookup of the same
 //! point finds, at every depth, on edges and corners too.
 //!
-//! The numbering is Ogaki's: with [`ARITY`] `M`, `R = √M` and `βk = min(R - 1, ⌊(1 - bk) R⌋)`, the index is
-//! `β0² + (β1 - β2) + β0`. Rows are numbered from vertex 0; row `r` holds `2 r + 1` cells, upright and inverted ones
-//! alternating. An upright cell has the corners of the whole triangle in the same order; an inverted one is turned by
+//! The order is Ogaki's: with [`ARITY`] `M`, `R = √M` and `βk = min(R - 1, ⌊(1 - bk) R⌋)`, the rank is
+//! `β0² + (β1 - β2) + β0`. Rows are counted from vertex 0; row `r` holds `2 r + 1` cells, upright and inverted ones
+//! alternating. `R` successive ranks are a group. The number of a cell is that of a lane, `member · R + group`, so that
+//! the sums of all groups are the sum of `R` vectors. An upright cell has the corners of the whole triangle in the same order; an inverted one is turned by
 //! half a circle, corner `k` lying across from the edge that would be edge `k`. In its own coordinates an inverted cell
 //! is a triangle like any other, so that the next level does not see the difference.
 
@@ -20,11 +21,14 @@ pub(crate) const LATTICE: u32 = 1 << LATTICE_BITS;
 
 /// How often the whole triangle's edge may be halved. *Proved*: see below. A level halves it [`LEVEL_HALVINGS`] times.
 ///
-/// The smallest cell is 16 lattice units wide and still has points strictly inside.
+/// The smallest cell is at least 16 lattice units wide and still has points strictly inside.
 pub(crate) const MAX_HALVINGS: u32 = 20;
 
-/// Cells of a node. *Format*: it decides on the layout of [`CellBlock`](super::node::CellBlock).
-pub(crate) const ARITY: usize = 4;
+/// Cells of a node. *Format*: it decides on the layout of [`CellNode`](super::node::CellNode).
+///
+/// *Measured* for 4, 16 and 64 on a quad with spots (docs/ACCURACY.md, "Wide steps"): fewer cells take fewer bytes and a
+/// little less time, at a multiple of the variance.
+pub(crate) const ARITY: usize = 64;
 
 /// Cells along one edge of a node.
 pub(crate) const EDGE_CELLS: u32 = (ARITY as u32).isqrt();
@@ -33,6 +37,12 @@ pub(crate) const EDGE_CELLS: u32 = (ARITY as u32).isqrt();
 pub(crate) const LEVEL_HALVINGS: u32 = EDGE_CELLS.trailing_zeros();
 
 const _: () = assert!(EDGE_CELLS.is_power_of_two() && (EDGE_CELLS * EDGE_CELLS) as usize == ARITY);
+
+/// Converts between a rank and the number of a lane: the one way is the other.
+const fn transposed(index: usize) -> usize {
+    const R: usize = EDGE_CELLS as usize;
+    index % R * R + index / R
+}
 
 /// A point of the triangle. The coordinates sum to [`LATTICE`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,11 +105,11 @@ pub(crate) fn child(local: [u32; 3], size: u32) -> (usize, [u32; 3]) {
     if f1 + f2 <= t {
         let row = a1 + a2;
         let a0 = r - 1 - row;
-        ((row * row + 2 * a2) as usize, [j0 - (a0 << shift), f1, f2])
+        (transposed((row * row + 2 * a2) as usize), [j0 - (a0 << shift), f1, f2])
     } else {
         let row = a1 + a2 + 1;
         let a0 = r - 1 - row;
-        ((row * row + 2 * a2 + 1) as usize, [((a0 + 1) << shift) - j0, t - f1, t - f2])
+        (transposed((row * row + 2 * a2 + 1) as usize), [((a0 + 1) << shift) - j0, t - f1, t - f2])
     }
 }
 
@@ -117,16 +127,16 @@ pub(crate) struct CellPosition {
 pub(crate) const fn position(index: usize) -> CellPosition {
     let r = EDGE_CELLS;
     debug_assert!(index < ARITY);
-    let index = index as u32;
-    let row = index.isqrt();
-    let column = index - row * row;
+    let rank = transposed(index) as u32;
+    let row = rank.isqrt();
+    let column = rank - row * row;
     let a2 = column / 2;
     let inverted = column % 2 == 1;
     CellPosition { a: [r - 1 - row, row - a2 - column % 2, a2], inverted }
 }
 
 /// The positions of all cells of a node.
-static POSITIONS: [CellPosition; ARITY] = {
+pub(super) static POSITIONS: [CellPosition; ARITY] = {
     let mut positions = [position(0); ARITY];
     let mut index = 1;
     while index < ARITY {

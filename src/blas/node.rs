@@ -1,8 +1,8 @@
 //! What a BLAS is made of: plain data, in one pool for all triangles of a sampler.
 //!
-//! A node is [`ARITY`] cells in the order of [`barycentric::child`](crate::blas::barycentric::child); node `i` owns the
-//! cells from `i ARITY` on. The nodes of a tree are numbered breadth first, so that the nodes below the cells of a
-//! block have successive numbers, and a bit a cell tells them all (Jacobson 1989, level-order unary degree sequence).
+//! A node is [`ARITY`] cells, by the numbers that [`barycentric::child`](crate::blas::barycentric::child) gives them. The
+//! nodes of a tree are numbered breadth first, so that the nodes below the cells of a node have successive numbers, and a
+//! bit a cell tells them all (Jacobson 1989, level-order unary degree sequence).
 
 use alloc::vec::Vec;
 
@@ -23,54 +23,63 @@ pub(crate) fn storable(value: f64) -> f32 {
     if value > 0.0 { (value as f32).clamp(f32::MIN_POSITIVE, MAX_AVERAGE) } else { 0.0 }
 }
 
-/// Cells of a block. A tree starts at the first cell of one. *Format*: as many as a word has bits.
-pub(crate) const BLOCK_CELLS: usize = 32;
+/// Words of a node before its codes. *Format*.
+const HEADER_WORDS: usize = 3;
 
-/// Successive cells: eight nodes.
+/// Words of a node.
+const NODE_WORDS: usize = HEADER_WORDS + ARITY / 4;
+
+/// A node.
 ///
-/// Word 0 has the bit of every cell that has a node below, word 1 the number of the first such node. The bytes of the
-/// others are the [codes](crate::blas::code) of the average weights over the cells.
+/// Words 0 and 1 have the bit of every cell that has a node below, word 2 the number of the first such node. The bytes of
+/// the others are the [codes](crate::blas::code) of the average weights over the cells.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub(crate) struct CellBlock([u32; 2 + BLOCK_CELLS / 4]);
+pub(crate) struct CellNode([u32; NODE_WORDS]);
 
-const _: () = assert!(size_of::<CellBlock>() == 40 && BLOCK_CELLS / ARITY * ARITY == BLOCK_CELLS);
+const _: () = assert!(size_of::<CellNode>() == 76 && ARITY == u64::BITS as usize);
 
-impl CellBlock {
+impl CellNode {
     #[inline(always)]
-    fn codes(&self) -> &[u8; BLOCK_CELLS] {
-        let bytes: &[u8; 8 + BLOCK_CELLS] = bytemuck::cast_ref(&self.0);
-        bytes.last_chunk().expect("a block is longer than its codes")
+    fn codes(&self) -> &[u8; ARITY] {
+        let bytes: &[u8; 4 * NODE_WORDS] = bytemuck::cast_ref(&self.0);
+        bytes.last_chunk().expect("a node is longer than its codes")
     }
 
     /// Which cells have a node below.
     #[inline(always)]
-    pub(crate) fn divided(&self) -> u32 {
-        self.0[0]
+    pub(crate) fn divided(&self) -> u64 {
+        u64::from(self.0[1]) << 32 | u64::from(self.0[0])
     }
 }
 
-/// Relative average weights over the cells of a node. Positive wherever any lookup in the cell is.
+/// Reads the relative average weights over the cells of a node. Positive wherever any lookup in the cell is.
 #[inline(always)]
-pub(crate) fn averages(blocks: &[CellBlock], node: u32) -> [f32; ARITY] {
-    let first = node as usize * ARITY;
-    let codes = &blocks[first / BLOCK_CELLS].codes()[first % BLOCK_CELLS..][..ARITY];
-    core::array::from_fn(|i| decode(codes[i]))
+pub(crate) fn read_averages(nodes: &[CellNode], node: u32, averages: &mut [f32; ARITY]) {
+    for (average, code) in averages.iter_mut().zip(nodes[node as usize].codes()) {
+        *average = decode(*code);
+    }
+}
+
+/// [`read_averages`] into an array of their own.
+pub(crate) fn averages(nodes: &[CellNode], node: u32) -> [f32; ARITY] {
+    let mut averages = [0.0; ARITY];
+    read_averages(nodes, node, &mut averages);
+    averages
 }
 
 /// The node below a cell of a node, or [`LEAF`].
 #[inline(always)]
-pub(crate) fn below(blocks: &[CellBlock], node: u32, cell: usize) -> u32 {
-    let at = node as usize * ARITY + cell;
-    let [divided, first, ..] = blocks[at / BLOCK_CELLS].0;
-    let bit = 1 << (at % BLOCK_CELLS);
-    if divided & bit == 0 { LEAF } else { first.wrapping_add((divided & (bit - 1)).count_ones()) }
+pub(crate) fn below(nodes: &[CellNode], node: u32, cell: usize) -> u32 {
+    let node = &nodes[node as usize];
+    let (divided, bit) = (node.divided(), 1 << cell);
+    if divided & bit == 0 { LEAF } else { node.0[2].wrapping_add((divided & (bit - 1)).count_ones()) }
 }
 
 /// Mean of a node's relative averages.
 #[inline]
-pub(crate) fn mean(blocks: &[CellBlock], node: u32) -> f32 {
-    averages(blocks, node).iter().sum::<f32>() / ARITY as f32
+pub(crate) fn mean(nodes: &[CellNode], node: u32) -> f32 {
+    averages(nodes, node).iter().sum::<f32>() / ARITY as f32
 }
 
 /// The BLAS of one triangle.
@@ -96,35 +105,30 @@ impl Root {
 /// order of the nodes. Returns the number of its first node.
 ///
 /// The caller has made sure with [`end`] that numbers suffice.
-pub(crate) fn append(blocks: &mut Vec<CellBlock>, averages: &[f32], divided: &[bool]) -> u32 {
-    let root = first_free(blocks);
+pub(crate) fn append(nodes: &mut Vec<CellNode>, averages: &[f32], divided: &[bool]) -> u32 {
+    let root = nodes.len() as u32;
     let largest = averages.iter().fold(f32::MIN_POSITIVE, |largest, average| largest.max(*average));
     let mut next = root + 1;
-    for (averages, divided) in averages.chunks(BLOCK_CELLS).zip(divided.chunks(BLOCK_CELLS)) {
-        let mut block = CellBlock([0; 2 + BLOCK_CELLS / 4]);
-        block.0[1] = next;
+    for (averages, divided) in averages.chunks_exact(ARITY).zip(divided.chunks_exact(ARITY)) {
+        let mut node = CellNode([0; NODE_WORDS]);
+        node.0[2] = next;
         for (cell, (average, divided)) in averages.iter().zip(divided).enumerate() {
             let code = encode(average / largest * LARGEST_VALUE);
-            bytemuck::bytes_of_mut(&mut block.0)[8 + cell] = code;
-            block.0[0] |= u32::from(*divided) << cell;
+            bytemuck::bytes_of_mut(&mut node.0)[4 * HEADER_WORDS + cell] = code;
+            node.0[cell / 32] |= u32::from(*divided) << (cell % 32);
         }
-        next += block.divided().count_ones();
-        blocks.push(block);
+        next += node.divided().count_ones();
+        nodes.push(node);
     }
     root
 }
 
-/// The number that the next tree's first node gets.
-fn first_free(blocks: &[CellBlock]) -> u32 {
-    (blocks.len() * BLOCK_CELLS / ARITY) as u32
-}
-
-/// The number of nodes in the pool after a tree of `nodes` was appended.
-pub(crate) fn end(blocks: &[CellBlock], nodes: usize) -> usize {
-    blocks.len() * BLOCK_CELLS / ARITY + nodes
+/// The number of nodes in the pool after a tree of `count` was appended.
+pub(crate) fn end(nodes: &[CellNode], count: usize) -> usize {
+    nodes.len() + count
 }
 
 /// Whether the tree of a root, if there is one, starts in this part of a pool.
-pub(crate) fn holds(blocks: &[CellBlock], root: Root) -> bool {
-    root.node == LEAF || (root.node as usize) < end(blocks, 0)
+pub(crate) fn holds(nodes: &[CellNode], root: Root) -> bool {
+    root.node == LEAF || (root.node as usize) < nodes.len()
 }

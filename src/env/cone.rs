@@ -155,7 +155,7 @@ impl EnvironmentView<'_> {
     }
 
     /// Depth of the finest level whose texels are at least as wide as `side`, so that it touches 2x2 at most.
-    #[inline]
+    #[inline(always)]
     fn depth_of_side(&self, side: f32) -> u32 {
         // A little more than `side`: where both are equal, rounding could make it three texels.
         floor_log2(1.0 / (SIDE_SLACK * side)).clamp(0, self.header.depth as i32) as u32

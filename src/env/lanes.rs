@@ -7,7 +7,7 @@
 
 use super::cone::{CONSTANT_RATIO, DEFENSIVE_SHARE};
 use super::view::EnvironmentView;
-use crate::math::{self, at_least, at_most};
+use crate::math::{self, at_least, at_most, only_if};
 use crate::warp::equal_area::{QUICK_ERROR, SPHERE, STRETCH};
 
 /// Share of the covering lookup in an estimate. *Measured* on skies with black patches and with lamps: 2 % to 25 % differ
@@ -61,6 +61,22 @@ impl EnvironmentView<'_> {
         1 << self.depth_of_solid_angle(solid_angle)
     }
 
+    /// Returns [`filter_size`](Self::filter_size) of a lane. `texels` is [`filter_texels`](Self::filter_texels) of the solid
+    /// angle, `finest` is [`size`](Self::size).
+    #[inline(always)]
+    pub(crate) fn filter_size_of_lane(texels: f32, finest: f32) -> f32 {
+        // Half the logarithm, rounded down: an operation on the exponent. NaN gives the finest level.
+        let size = f32::from_bits((((texels.to_bits() >> 23) + 127) >> 1) << 23);
+        at_least(at_most(size, finest), 1.0)
+    }
+
+    /// Returns twice the number of texels of a level whose filter has this solid angle: the squares of sizes are rounded to
+    /// the nearest power of four by rounding twice as much down.
+    #[inline(always)]
+    pub(crate) fn filter_texels(solid_angle: f32) -> f32 {
+        2.0 * 9.0 * SPHERE / at_least(solid_angle, f32::MIN_POSITIVE)
+    }
+
     /// Returns the number, among those of all levels, of the first texel of the level of this size.
     #[inline(always)]
     pub(crate) fn first_texel(size: u32) -> u32 {
@@ -91,7 +107,7 @@ impl EnvironmentView<'_> {
 
     /// Multiplies weights with the radiances of regions over the mean radiance. `fine` are the texels of the size of the
     /// regions, `cover` those whose filters hold them, where that is asked for. A weight becomes zero only if its region is
-    /// black.
+    /// black, and what is zero stays so.
     #[inline(always)]
     pub(crate) fn weigh_lanes<const LANES: usize>(
         &self,
@@ -113,7 +129,8 @@ impl EnvironmentView<'_> {
                 for i in 0..LANES {
                     let radiance = scale * ((1.0 - COVER_SHARE) * fine[i] + COVER_SHARE * cover[i]);
                     let weight = weights[i] * at_least(radiance, f32::MIN_POSITIVE);
-                    weights[i] = if cover[i] > 0.0 { at_least(weight, f32::MIN_POSITIVE) } else { 0.0 };
+                    let is_possible = cover[i] > 0.0 && weights[i] > 0.0;
+                    weights[i] = only_if(is_possible, at_least(weight, f32::MIN_POSITIVE));
                 }
             }
         }

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
 use super::{Energies, Illumination, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
-use crate::blas::{self, CellBlock, ImageTree, Procedural, RegisteredFunction, Root, Texture};
+use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
 use crate::progress::Progress;
@@ -28,7 +28,7 @@ pub(crate) struct LightCollection<'a> {
     indices: Vec<u32>,
     /// Where each mesh starts in `indices`, and the end.
     meshes: Vec<u32>,
-    cells: Vec<CellBlock>,
+    cells: Vec<CellNode>,
     /// Trees over functions by texture and the bits of the three uvs.
     shared: BTreeMap<TreeKey, Root>,
     /// Trees over images that are still to be built, and their numbers.

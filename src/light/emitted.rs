@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{Light, LightKind, LightTriangle, LightsView};
-use crate::blas::{self, CellBlock, CellTarget, CellWeight, Draw, Follow, Guide, Lattice, LatticeCell};
+use crate::blas::{self, ARITY, CellNode, CellTarget, Draw, Follow, Guide, Lattice, LatticeCell};
 use crate::warp::Variate;
 
 /// A point that light leaves from, drawn by the light's own weights.
@@ -46,7 +46,7 @@ impl LightsView<'_> {
 
 fn start_on_triangle<G: Guide>(
     light: &LightTriangle,
-    cells: &[CellBlock],
+    cells: &[CellNode],
     guide: &mut G,
     point: impl Fn(&G, LatticeCell) -> Lattice,
 ) -> Option<EmissionStart> {
@@ -75,8 +75,13 @@ impl CellTarget for Everywhere {
 
     fn child(&self, (): &(), _index: usize) {}
 
-    #[inline]
-    fn weigh(&self, _at: LatticeCell, (): &mut ()) -> CellWeight {
-        CellWeight { weight: 1.0, is_final: true }
+    #[inline(always)]
+    fn weigh_children(&self, _at: LatticeCell, (): &(), _averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
+        *weights = [1.0; ARITY];
+    }
+
+    #[inline(always)]
+    fn is_final(&self, _at: LatticeCell, (): &mut (), _levels: Option<u32>) -> bool {
+        true
     }
 }

@@ -6,7 +6,7 @@ use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use crate::math;
-use crate::receiver::{CornerHeights, Receiver, ReceiverKind};
+use crate::receiver::{Receiver, ReceiverKind};
 
 /// Which estimate of the irradiance from a cell guides the descent inside a triangle.
 ///
@@ -42,7 +42,7 @@ const LEAST_BOUNDARY: f32 = 1e-4;
 /// Share of a cell's area that is added to the squared distance of its center.
 ///
 /// Measured (docs/ACCURACY.md, "Terms inside a triangle"): 0.1 and 0.6 are worse near a triangle.
-const SOFTENING: f32 = 0.25;
+pub(super) const SOFTENING: f32 = 0.25;
 
 impl Illumination {
     /// Returns the strategy of a code that bytes hold.
@@ -52,76 +52,54 @@ impl Illumination {
             .find(|kind| *kind as u32 == value)
     }
 
-    /// Returns the estimates for cells of one size in a plane. Zero only below the horizon; never NaN, possibly infinite.
-    #[inline(always)]
-    pub(super) fn estimate<const COUNT: usize>(
-        self,
-        receiver: Receiver,
-        cells: &CellViews<COUNT>,
-        vertices: impl Fn(usize) -> [Vec3; 3],
-    ) -> [f32; COUNT] {
-        let mut estimates = match self {
-            Self::ClampedVertices => clamped_vertices(receiver, cells),
-            _ => core::array::from_fn(|i| self.at_center(receiver, cells, i, &vertices)),
-        };
-        if receiver.has_horizon() {
-            let [a, b, c] = &cells.heights;
-            for (i, estimate) in estimates.iter_mut().enumerate() {
-                let highest = a[i].max(b[i]).max(c[i]);
-                *estimate = if highest < cells.horizon { 0.0 } else { *estimate };
-            }
+    /// Returns the estimate for a cell. Zero only below the horizon; never NaN, possibly infinite.
+    pub(super) fn estimate(self, receiver: Receiver, cell: &CellView) -> f32 {
+        let [a, b, c] = cell.heights;
+        if a.max(b).max(c) < cell.horizon {
+            return 0.0;
         }
-        estimates
+        match self {
+            Self::ClampedVertices => clamped_vertices(receiver, cell),
+            _ => self.at_center(receiver, cell),
+        }
     }
 
     /// The terms that look at the center of a cell.
-    fn at_center<const COUNT: usize>(
-        self,
-        receiver: Receiver,
-        cells: &CellViews<COUNT>,
-        i: usize,
-        vertices: &impl Fn(usize) -> [Vec3; 3],
-    ) -> f32 {
-        let (area, distance2) = (cells.area, cells.distance2[i]);
+    fn at_center(self, receiver: Receiver, cell: &CellView) -> f32 {
+        let &CellView { vertices, heights, distance2, area, height, .. } = cell;
         let inverse = 1.0 / math::sqrt(distance2);
-        let cos_l = (cells.height * inverse).min(1.0);
-        let mean = cells.heights.iter().map(|height| height[i]).sum::<f32>() * (1.0 / 3.0);
-        let cos_s = receiver.weight_at_height(mean, inverse);
+        let cos_l = (height * inverse).min(1.0);
+        let cos_s = receiver.weight_at_height(heights.iter().sum::<f32>() * (1.0 / 3.0), inverse);
         let least = LEAST_CELL_COSINE;
         let conservative = area * (1.0 + cos_s).max(least) * (1.0 + cos_l) * (0.25 * FRAC_1_PI) / distance2;
         match self {
             Self::ClampedVertices | Self::Conservative => conservative,
             Self::PointToPoint => area * cos_s.max(least) * cos_l.max(least) * FRAC_1_PI / distance2,
-            Self::Boundary => receiver.irradiance(&vertices(i)).max(LEAST_BOUNDARY * conservative),
+            Self::Boundary => receiver.irradiance(&vertices).max(LEAST_BOUNDARY * conservative),
         }
     }
 }
 
-/// Cells of one size in a plane as a shading point sees them.
-pub(super) struct CellViews<const COUNT: usize> {
+/// A cell as a shading point sees it.
+pub(super) struct CellView {
+    /// Corners relative to the shading point.
+    pub(super) vertices: [Vec3; 3],
     /// Heights of the corners over the receiver's plane, if it has a normal.
-    pub(super) heights: [[f32; COUNT]; 3],
-    /// Weights of the corners.
-    pub(super) weights: [[f32; COUNT]; 3],
-    /// Height below which a corner is below the horizon for certain.
+    pub(super) heights: [f32; 3],
+    /// Height below which a corner is below the horizon for certain; negative infinity without a horizon.
     pub(super) horizon: f32,
-    /// Squared distances of the centers; positive.
-    pub(super) distance2: [f32; COUNT],
-    /// Area of each.
+    /// Squared distance of the center; positive.
+    pub(super) distance2: f32,
     pub(super) area: f32,
-    /// Distance of the shading point from their plane.
+    /// Distance of the shading point from its plane.
     pub(super) height: f32,
 }
 
-/// The default, `Σ_k w_k max(0, n · v_k) A h / π (d² + A/4)²`. Neither square roots nor branches on a surface, so that cells
-/// share vector registers.
-#[inline(always)]
-fn clamped_vertices<const COUNT: usize>(receiver: Receiver, cells: &CellViews<COUNT>) -> [f32; COUNT] {
-    let softened: [f32; COUNT] = core::array::from_fn(|i| cells.distance2[i] + SOFTENING * cells.area);
-    let corners = CornerHeights { heights: &cells.heights, weights: &cells.weights, distance2: &softened };
-    let toward = receiver.mean_over_cells(&corners);
-    let scale = cells.area * cells.height * FRAC_1_PI;
-    core::array::from_fn(|i| (scale * toward[i] / (softened[i] * softened[i])).max(f32::MIN_POSITIVE))
+/// The default, `Σ_k max(0, n · v_k) A h / 3 π (d² + A/4)²`, as the [kernel](super::cell_kernel) has it for many cells.
+fn clamped_vertices(receiver: Receiver, cell: &CellView) -> f32 {
+    let softened = cell.distance2 + SOFTENING * cell.area;
+    let toward = receiver.height_weights().mean(cell.heights, math::sqrt(cell.distance2));
+    (cell.area * cell.height * FRAC_1_PI * toward / (softened * softened)).max(f32::MIN_POSITIVE)
 }
 
 #[cfg(test)]
@@ -131,17 +109,16 @@ mod tests {
 
     /// The estimate for one cell.
     fn estimate(strategy: Illumination, receiver: Receiver, vertices: [Vec3; 3]) -> f32 {
-        let normal = if receiver.has_horizon() { receiver.normal() } else { Vec3::Z };
         let [a, b, c] = vertices;
-        let cells = CellViews {
-            heights: vertices.map(|v| [normal.dot(v)]),
-            weights: [[1.0 / 3.0]; 3],
-            horizon: horizon(normal, &vertices),
-            distance2: [((a + b + c) / 3.0).length_squared()],
+        let cell = CellView {
+            vertices,
+            heights: vertices.map(|v| receiver.normal().dot(v)),
+            horizon: if receiver.has_horizon() { horizon(receiver.normal(), &vertices) } else { f32::NEG_INFINITY },
+            distance2: ((a + b + c) / 3.0).length_squared(),
             area: 0.5,
             height: 0.3,
         };
-        strategy.estimate(receiver, &cells, |_| vertices)[0]
+        strategy.estimate(receiver, &cell)
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! (the light as seen from a shading point). Above this level a light is the number of a leaf. A new kind is a new file, and
 //! a variant in both enums.
 
-mod cell_weight;
+mod cell_kernel;
 mod collect;
 mod emitted;
 mod energy;
@@ -20,7 +20,7 @@ mod visible_part;
 
 use glam::{DVec3, Vec3};
 
-use crate::blas::{CellBlock, Lattice};
+use crate::blas::{CellNode, Lattice};
 use crate::bounds::{LightBounds, Moments};
 use crate::buffers::buffers;
 use crate::env::EnvironmentView;
@@ -60,7 +60,7 @@ buffers! {
         /// Triangles, in the order of the tree's leaves.
         triangles: LightTriangle = b"TRIA" version 1,
         /// Nodes of the trees over textures.
-        cells: CellBlock = b"CELL" version 1,
+        cells: CellNode = b"CELL" version 2,
         /// Where the triangles of each mesh start in `leaf_of`, and their number at the end.
         meshes: u32 = b"MESH" version 1,
         /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`].

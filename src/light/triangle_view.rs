@@ -4,10 +4,11 @@ use core::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
 
+use super::cell_kernel::CellDescent;
 use super::spherical_grid::{GridCell, SphericalGrid};
 use super::{DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind};
-use crate::blas::{self, CellBlock, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
-use crate::env::EnvironmentView;
+use crate::blas::{CellNode, Draw, Follow, Guide, LEAF, Lattice, LatticeCell, Root};
+use crate::env::{DirectionCone, EnvironmentView};
 use crate::geometry;
 use crate::math;
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
@@ -69,7 +70,7 @@ pub(crate) struct TriangleView<'a> {
     /// The tree over the texture.
     pub(crate) root: Root,
     /// Nodes of the trees over textures.
-    pub(crate) cells: &'a [CellBlock],
+    pub(crate) cells: &'a [CellNode],
 }
 
 impl<'a> TriangleView<'a> {
@@ -79,7 +80,7 @@ impl<'a> TriangleView<'a> {
         light: &LightTriangle,
         x: &ShadingPoint,
         illumination: Illumination,
-        cells: &'a [CellBlock],
+        cells: &'a [CellNode],
         environment: Option<&'a EnvironmentView<'a>>,
     ) -> Option<Self> {
         // NaN fails.
@@ -132,6 +133,12 @@ impl<'a> TriangleView<'a> {
         geometry::intersect(self.exact_vertices, direction).map(Lattice::from_barycentrics)
     }
 
+    /// Descends to a cell of about constant density. Returns it with its probability.
+    #[inline(always)]
+    fn descend(&self, guide: &mut impl Guide) -> Option<(LatticeCell, f64)> {
+        InstructionSet::best().run(CellDescent { view: self, guide })
+    }
+
     /// Returns the density per solid angle of a point of a cell that was chosen with this probability, `p_A d² / cos θl`.
     /// `None` where it is not a positive number.
     #[inline]
@@ -146,8 +153,7 @@ impl<'a> TriangleView<'a> {
     #[inline]
     pub(super) fn prefers_directions(&self) -> bool {
         let is_plain = self.root.node == LEAF && self.illumination == Illumination::ClampedVertices;
-        let is_final = || self.environment.is_none() || self.weigh(LatticeCell::whole(), &mut self.whole()).is_final;
-        is_plain && !(self.has_constant_geometry() && is_final())
+        is_plain && !self.is_about_constant()
     }
 
     /// Whether a point is below the horizon, and not only by rounding to the lattice.
@@ -175,7 +181,7 @@ impl LightViewKind for TriangleView<'_> {
             }
         }
         let mut draw = Draw::new(u);
-        let (cell, cell_pmf) = blas::descend(self.cells, self.root, self, &mut draw)?;
+        let (cell, cell_pmf) = self.descend(&mut draw)?;
         let point = draw.point(cell);
         Some(DrawnPoint { point, relative: self.point(point), pdf: self.pdf_in(cell, cell_pmf, point)? })
     }
@@ -187,7 +193,7 @@ impl LightViewKind for TriangleView<'_> {
                 return pdf;
             }
         }
-        let (cell, cell_pmf) = blas::descend(self.cells, self.root, self, &mut Follow::new(point))?;
+        let (cell, cell_pmf) = self.descend(&mut Follow::new(point))?;
         self.pdf_in(cell, cell_pmf, point)
     }
 
@@ -211,8 +217,19 @@ impl LightViewKind for TriangleView<'_> {
     }
 
     fn irradiance(&self, scale: f32) -> f32 {
-        let weight = self.weigh(LatticeCell::whole(), &mut self.whole()).weight;
-        PI * self.root.average * scale * weight
+        let radiance = self.environment.map_or(1.0, |environment| {
+            let [a, b, c] = self.vertices;
+            let center = (a + b + c) * (1.0 / 3.0);
+            let least = (self.height * self.height).max(f32::MIN_POSITIVE);
+            let inverse = 1.0 / math::sqrt(center.length_squared().max(least));
+            let cone = DirectionCone {
+                direction: center * inverse,
+                sin_radius: math::sqrt(self.radius2) * inverse,
+                solid_angle: self.area * self.height * inverse * inverse * inverse,
+            };
+            environment.estimate_radiance(&cone).value
+        });
+        PI * self.root.average * scale * self.estimate(LatticeCell::whole()) * radiance
     }
 }
 

@@ -13,6 +13,7 @@ mod volume;
 
 use glam::Vec3;
 
+use crate::math::at_least;
 pub(crate) use lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use surface::Surface;
 use transmissive::Transmissive;
@@ -101,14 +102,23 @@ fn unit(normal: Vec3) -> Vec3 {
     if (normal.length_squared() - 1.0).abs() <= UNIT_TOLERANCE { normal } else { normal.normalize_or(normal) }
 }
 
-/// Heights of the corners of cells over the receiver's plane, each with the corner's weight in the cell's mean.
-pub(crate) struct CornerHeights<'a, const LANES: usize> {
-    /// Heights, by corner. Zero without a normal.
-    pub(crate) heights: &'a [[f32; LANES]; 3],
-    /// Weights, by corner; those of one cell sum to 1.
-    pub(crate) weights: &'a [[f32; LANES]; 3],
-    /// Squared distances of the cells, softened: the square root stands in for the height where every direction counts.
-    pub(crate) distance2: &'a [f32; LANES],
+/// How heights over the receiver's plane and distances make the weight of a cell: numbers alone, so that all kinds share
+/// one loop without a branch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HeightWeights {
+    /// What a height below the plane is multiplied by.
+    below: f32,
+    /// What the distance is multiplied by, which stands in for the height where every direction counts.
+    distance: f32,
+}
+
+impl HeightWeights {
+    /// Returns the mean weight of a cell times its distance, by the heights of its corners.
+    #[inline(always)]
+    pub(crate) fn mean(self, [a, b, c]: [f32; 3], distance: f32) -> f32 {
+        let weight = |height: f32| at_least(height, self.below * height);
+        (weight(a) + weight(b) + weight(c)) * (1.0 / 3.0) + self.distance * distance
+    }
 }
 
 /// The questions that every kind of receiver answers.
@@ -128,8 +138,8 @@ pub(crate) trait ReceiverKind: Copy {
     /// Returns the mean weight of the directions of a cone. Zero only if all of them have the weight zero.
     fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32;
 
-    /// Returns the mean weights of cells times their distances, by the weights at their corners.
-    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES];
+    /// Returns what the weights of cells are made from.
+    fn height_weights(self) -> HeightWeights;
 
     /// Returns the weight of the direction to a center at this mean height and distance.
     fn weight_at_height(self, height: f32, inverse_distance: f32) -> f32;
@@ -193,8 +203,8 @@ impl ReceiverKind for Receiver {
     }
 
     #[inline(always)]
-    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES] {
-        dispatch!(self, kind => kind.mean_over_cells(corners))
+    fn height_weights(self) -> HeightWeights {
+        dispatch!(self, kind => kind.height_weights())
     }
 
     #[inline]

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::lambert::lambert;
 use super::lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
-use super::{CornerHeights, ReceiverKind};
+use super::{HeightWeights, ReceiverKind};
 use crate::geometry::is_below;
 
 /// Least cosine that a cell of directions above the horizon is weighed by.
@@ -47,9 +47,8 @@ impl ReceiverKind for Surface {
     }
 
     #[inline(always)]
-    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES] {
-        let ([a, b, c], [p, q, r]) = (corners.heights, corners.weights);
-        core::array::from_fn(|i| p[i] * a[i].max(0.0) + q[i] * b[i].max(0.0) + r[i] * c[i].max(0.0))
+    fn height_weights(self) -> HeightWeights {
+        HeightWeights { below: 0.0, distance: 0.0 }
     }
 
     #[inline]

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::lambert::lambert;
 use super::lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
-use super::{CornerHeights, ReceiverKind};
+use super::{HeightWeights, ReceiverKind};
 use crate::math;
 
 #[derive(Clone, Copy)]
@@ -40,9 +40,8 @@ impl ReceiverKind for Transmissive {
     }
 
     #[inline(always)]
-    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES] {
-        let ([a, b, c], [p, q, r]) = (corners.heights, corners.weights);
-        core::array::from_fn(|i| p[i] * a[i].abs() + q[i] * b[i].abs() + r[i] * c[i].abs())
+    fn height_weights(self) -> HeightWeights {
+        HeightWeights { below: -1.0, distance: 0.0 }
     }
 
     #[inline]

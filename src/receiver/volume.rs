@@ -6,8 +6,7 @@ use glam::Vec3;
 
 use super::lambert::solid_angle;
 use super::lanes::ReceiverLanes;
-use super::{CornerHeights, ReceiverKind};
-use crate::math;
+use super::{HeightWeights, ReceiverKind};
 
 #[derive(Clone, Copy)]
 pub(super) struct Volume;
@@ -39,8 +38,8 @@ impl ReceiverKind for Volume {
     }
 
     #[inline(always)]
-    fn mean_over_cells<const LANES: usize>(self, corners: &CornerHeights<'_, LANES>) -> [f32; LANES] {
-        core::array::from_fn(|i| math::sqrt(corners.distance2[i]))
+    fn height_weights(self) -> HeightWeights {
+        HeightWeights { below: 0.0, distance: 1.0 }
     }
 
     #[inline]

@@ -113,6 +113,12 @@ pub(crate) fn pick(weights: &[f32], total: f64, variate: &mut Variate) -> usize 
     chosen
 }
 
+/// Returns the sum of an array's weights as [`pick_wide`] forms it.
+#[inline(always)]
+pub(crate) fn sum_wide<const N: usize>(weights: &[f32; N]) -> f64 {
+    ends(weights)[N - 1]
+}
+
 /// Returns the probability with which [`pick_wide`] picks an index.
 #[inline(always)]
 pub(crate) fn pmf_wide<const N: usize>(weights: &[f32; N], i: usize) -> f64 {

@@ -7,7 +7,7 @@ pub(crate) mod triangle;
 pub(crate) mod variate;
 
 pub(crate) use discrete::{
-    keep_least, keep_positive, keep_possible, pick, pick_pair, pick_wide, pmf, pmf_wide, sum, within_range,
+    keep_least, keep_positive, keep_possible, pick, pick_pair, pick_wide, pmf, pmf_wide, sum, sum_wide, within_range,
 };
 pub(crate) use spherical_triangle::{COLUMNS, SphericalColumns, SphericalTriangle};
 pub(crate) use variate::{Variate, seed};

@@ -4,7 +4,7 @@ use crate::testing::Pcg32;
 /// Ogaki's formula in exact arithmetic, for points that are not on an inner edge.
 fn talk_index(local: [u32; 3], size: u32, r: u32) -> usize {
     let beta = local.map(|j| ((size - j) * r / size).min(r - 1) as i64);
-    (beta[0] * beta[0] + (beta[1] - beta[2]) + beta[0]) as usize
+    transposed((beta[0] * beta[0] + (beta[1] - beta[2]) + beta[0]) as usize)
 }
 
 fn numbering() {
@@ -37,11 +37,12 @@ fn numbering_is_consistent_on_a_small_lattice() {
 }
 
 #[test]
-fn numbering_of_four_is_corners_and_middle() {
-    assert_eq!(child([16, 0, 0], 16), (0, [8, 0, 0]));
-    assert_eq!(child([0, 16, 0], 16), (1, [0, 8, 0]));
-    assert_eq!(child([0, 0, 16], 16), (3, [0, 0, 8]));
-    assert_eq!(child([6, 5, 5], 16).0, 2);
+fn successive_numbers_are_those_of_different_groups() {
+    // The first group of eight begins at vertex 0, the second ends at the other end of the third row.
+    assert_eq!(child([128, 0, 0], 128), (0, [16, 0, 0]));
+    assert_eq!(child([0, 128, 0], 128).0, transposed(49));
+    assert_eq!(child([0, 0, 128], 128), (63, [0, 0, 16]));
+    assert_eq!((transposed(1), transposed(8), transposed(transposed(49))), (8, 1, 49));
 }
 
 /// Down a random path of cells, a point strictly inside of the last cell is looked up along the same path.
@@ -141,7 +142,7 @@ fn interior_points_are_uniform() {
         for j in 0..n {
             let u = [(f64::from(i) + 0.5) / f64::from(n), (f64::from(j) + 0.5) / f64::from(n)];
             let p = interior_point(size, u);
-            quarters[child(p, size).0] += 1;
+            quarters[p.iter().position(|&j| 2 * j > size).unwrap_or(3)] += 1;
             mean = core::array::from_fn(|k| mean[k] + f64::from(p[k]));
         }
     }
@@ -156,13 +157,14 @@ fn interior_points_are_uniform() {
 
 #[test]
 fn cells_hold_the_points_strictly_inside() {
-    let parent = LatticeCell { offset: [0; 3], inverted: false, size: 32 };
+    let parent = LatticeCell { offset: [0; 3], inverted: false, size: 16 * EDGE_CELLS };
+    let size = parent.size;
     for index in 0..ARITY {
         let cell = parent.child(index);
         let mut held = 0;
-        for j1 in 0..=32 {
-            for j2 in 0..=32 - j1 {
-                let point = Lattice([32 - j1 - j2, j1, j2]);
+        for j1 in 0..=size {
+            for j2 in 0..=size - j1 {
+                let point = Lattice([size - j1 - j2, j1, j2]);
                 let local = cell.local(point);
                 let is_inside = local.iter().all(|&j| j > 0);
                 assert_eq!(cell.holds(point), is_inside);
@@ -170,7 +172,7 @@ fn cells_hold_the_points_strictly_inside() {
                 if is_inside {
                     held += 1;
                     assert_eq!(cell.global(local.map(|j| j as u32)), point);
-                    assert_eq!(child(point.0, 32).0, index);
+                    assert_eq!(child(point.0, size).0, index);
                 }
             }
         }

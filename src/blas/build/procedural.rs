@@ -5,10 +5,10 @@ use core::fmt;
 
 use glam::{DVec2, Vec2};
 
-use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
+use crate::blas::barycentric::{LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
 use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
 use crate::blas::build::touched::TexelRange;
-use crate::blas::node::{BLOCK_CELLS, CellBlock, Root, storable};
+use crate::blas::node::{CellNode, Root, storable};
 use crate::error::{Error, ErrorKind};
 use crate::geometry::subdivision_centers;
 
@@ -133,7 +133,7 @@ pub(crate) fn build_procedural(
     function: &mut RegisteredFunction<'_>,
     mesh: usize,
     uv: [Vec2; 3],
-    pool: &mut Vec<CellBlock>,
+    pool: &mut Vec<CellNode>,
 ) -> Result<Root, Error> {
     let source = FunctionOnTriangle::new(function.function, uv);
     let fail = |fault: Fault| Error(fault.kind(mesh));
@@ -142,9 +142,9 @@ pub(crate) fn build_procedural(
         return Ok(Root::constant(storable(f64::from(range.max))));
     }
     let most = (FUNCTION_OWN_BYTES + function.extra).min(FUNCTION_TREE_BYTES);
-    let blocks = ((most / size_of::<CellBlock>() as f64) as usize).max(1);
+    let nodes = ((most / size_of::<CellNode>() as f64) as usize).max(1);
     let deepest = MAX_HALVINGS / LEVEL_HALVINGS;
-    let limits = GrowthLimits { nodes: blocks * BLOCK_CELLS / ARITY, fine: 0, deepest, variance: FUNCTION_VARIANCE };
+    let limits = GrowthLimits { nodes, worthwhile: 0, fine: 0, deepest, variance: FUNCTION_VARIANCE };
     let tree = grow(&source, &limits).map_err(fail)?;
     let (root, bytes) = tree.store(pool)?;
     function.extra -= (bytes - FUNCTION_OWN_BYTES).max(0.0).min(function.extra);

@@ -26,8 +26,17 @@ pub(crate) struct TexturePyramid<'a> {
     texture: Texture<'a>,
     /// From level 1 up to the one that is a single block.
     levels: Vec<PyramidLevel>,
-    /// Bytes that trees over this image may still take beyond two a texel.
+    /// What is left of the image's memory.
+    pub(super) memory: ImageMemory,
+}
+
+/// What trees over an image may still take.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct ImageMemory {
+    /// Bytes beyond two a texel.
     pub(super) extra: f64,
+    /// Bytes that triangles so far have left of what they could have taken: later ones may have them.
+    pub(super) saved: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -39,7 +48,8 @@ struct PyramidLevel {
 impl<'a> TexturePyramid<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
-        let mut pyramid = Self { texture, levels: Vec::new(), extra: BYTES_PER_IMAGE };
+        let memory = ImageMemory { extra: BYTES_PER_IMAGE, saved: 0.0 };
+        let mut pyramid = Self { texture, levels: Vec::new(), memory };
         let mut size = texture.size();
         while size != [1, 1] {
             let below = pyramid.levels.len() as u32;

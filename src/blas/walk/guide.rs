@@ -1,12 +1,13 @@
 //! What leads a descent from a cell to one of its children: random numbers, or a point that is given.
 
+use super::descend::GroupSums;
 use crate::blas::barycentric::{self, ARITY, EDGE_CELLS, LATTICE, LEVEL_HALVINGS, Lattice, LatticeCell};
-use crate::warp::{Variate, pick, sum};
+use crate::warp::{Variate, pick_wide};
 
 /// What leads a descent from a cell to one of its children.
 pub(crate) trait Guide {
-    /// Chooses one of the children, of which at least one has a positive weight.
-    fn choose(&mut self, weights: &[f32; ARITY]) -> usize;
+    /// Chooses one of the children, of which at least one has a positive weight. `groups` are the sums of their groups.
+    fn choose(&mut self, weights: &[f32; ARITY], groups: &GroupSums) -> usize;
 }
 
 /// Draws the way in proportion to the weights.
@@ -36,16 +37,14 @@ impl Draw {
 }
 
 impl Guide for Draw {
-    #[inline]
-    fn choose(&mut self, weights: &[f32; ARITY]) -> usize {
-        const GROUP: usize = EDGE_CELLS as usize;
-        let mut groups = [0.0; GROUP];
-        for (group, members) in groups.iter_mut().zip(weights.chunks_exact(GROUP)) {
-            *group = members.iter().sum();
-        }
-        let group = pick(&groups, sum(&groups), &mut self.u[1]);
-        let members = &weights[group * GROUP..][..GROUP];
-        group * GROUP + pick(members, sum(members), &mut self.u[0])
+    #[inline(always)]
+    fn choose(&mut self, weights: &[f32; ARITY], groups: &GroupSums) -> usize {
+        const GROUPS: usize = EDGE_CELLS as usize;
+        let [first, second] = &mut self.u;
+        let group = pick_wide(groups, second).map_or(0, |(group, _)| group);
+        let members: [f32; GROUPS] = core::array::from_fn(|member| weights[member * GROUPS + group]);
+        let member = pick_wide(&members, first).map_or(0, |(member, _)| member);
+        member * GROUPS + group
     }
 }
 
@@ -68,8 +67,8 @@ impl Follow {
 }
 
 impl Guide for Follow {
-    #[inline]
-    fn choose(&mut self, _weights: &[f32; ARITY]) -> usize {
+    #[inline(always)]
+    fn choose(&mut self, _weights: &[f32; ARITY], _groups: &GroupSums) -> usize {
         let (index, local) = barycentric::child(self.local, self.size);
         self.local = local;
         self.size >>= LEVEL_HALVINGS;

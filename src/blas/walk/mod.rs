@@ -5,7 +5,7 @@ mod descend;
 mod guide;
 mod target;
 
-pub(crate) use cell::{at_corners, centers, child_corners};
+pub(crate) use cell::{CHILD_CENTERS, child_corners, child_values};
 pub(crate) use descend::{descend, descend_below};
 pub(crate) use guide::{Draw, Follow, Guide};
-pub(crate) use target::{CellTarget, CellWeight, CellWeights, TextureChildren};
+pub(crate) use target::CellTarget;

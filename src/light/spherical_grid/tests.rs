@@ -3,14 +3,14 @@ use alloc::vec::Vec;
 use glam::{DVec3, Vec3};
 
 use super::{GridPoint, SphericalGrid};
-use crate::blas::{CellBlock, LEAF, Lattice, Root};
+use crate::blas::{CellNode, LEAF, Lattice, Root};
 use crate::env::{Environment, EnvironmentImage};
 use crate::light::{DrawnPoint, Illumination, LightTriangle, LightViewKind, TriangleView};
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::testing::{Pcg32, chi_square, chi_square_limit};
 use crate::warp::{SphericalTriangle, Variate, seed};
 
-const NO_CELLS: &[CellBlock] = &[];
+const NO_CELLS: &[CellNode] = &[];
 
 fn light(vertices: [Vec3; 3]) -> LightTriangle {
     LightTriangle {

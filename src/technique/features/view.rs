@@ -3,9 +3,10 @@
 use glam::Vec3;
 
 use super::opening::{Coverage, Opening};
-use crate::blas::{self, CellTarget, CellWeight, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
+use crate::blas::{self, ARITY, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{EnvironmentView, FeatureNode};
 use crate::light::{LightViewKind, TriangleView};
+use crate::math;
 use crate::warp::Variate;
 
 /// Ratio of a cell's to a feature's angular radius up to which the cell counts as one part, however its texture
@@ -14,7 +15,13 @@ use crate::warp::Variate;
 /// Measured on star and grid-100 (docs/ACCURACY.md, "Suns taken out"). Larger: fewer parts, so that a shading point is
 /// cheaper, but the texture inside a part is followed by the tree's descent alone. Smaller: more parts, up to the limit of
 /// the list.
-const SMALL_CELL: f32 = 0.5;
+const SMALL_CELL: f32 = 4.0;
+
+/// Rounding of a cell's corners relative to the largest coordinate of a vertex. Proved: a corner is a sum of three
+/// products, each off by less than 2e-7; the rest is for the axis and the products with it.
+///
+/// Larger: more cells are looked at closely. Smaller: a part of a feature could be missed.
+const ASIDE_ROUNDING: f32 = 1e-5;
 
 /// A part of a triangle through which a feature is visible.
 #[derive(Clone, Copy, Debug)]
@@ -74,14 +81,24 @@ impl<'a> FeatureView<'a> {
         scale: f32,
         found: &mut impl FnMut(FeaturePart, f32),
     ) {
-        let opening = self.opening(cell);
-        if below.average == 0.0 || opening.coverage(self.bright()) == Coverage::Nothing {
+        if below.average == 0.0 || self.is_aside(&corners) {
             return;
         }
-        if below.node == LEAF || self.is_small(&corners) {
+        let opening = self.opening(cell);
+        if opening.coverage(self.bright()) == Coverage::Nothing {
+            return;
+        }
+        if below.node == LEAF {
             let power = opening.power(self.environment, self.node);
             if power * below.average > 0.0 {
                 found(FeaturePart { cell, node: below.node, power }, power * below.average);
+            }
+            return;
+        }
+        if self.is_small(&corners) {
+            let through = scale * self.power_through(cell, below.node);
+            if through > 0.0 {
+                found(FeaturePart { cell, node: below.node, power: 0.0 }, through);
             }
             return;
         }
@@ -90,6 +107,15 @@ impl<'a> FeatureView<'a> {
             let root = Root { average: average * scale, node: blas::below(self.triangle.cells, below.node, i) };
             self.visit_below((cell.child(i), blas::child_corners(&corners, i)), root, scale, found);
         }
+    }
+
+    /// Power of the feature through a cell, relative to what a texture of the relative average one would let through: as if
+    /// the textures of its children were constant.
+    fn power_through(&self, cell: LatticeCell, node: u32) -> f32 {
+        let averages = blas::averages(self.triangle.cells, node);
+        let mut powers = [0.0; ARITY];
+        self.weigh_children(cell, &(), &averages, &mut powers);
+        averages.iter().zip(&powers).map(|(average, power)| average * power).sum()
     }
 
     /// Draws a point in a part.
@@ -129,6 +155,32 @@ impl<'a> FeatureView<'a> {
         &self.environment.feature_nodes()[self.node]
     }
 
+    /// Whether a cell is so far from the feature's axis that nothing of the feature is visible through it: a quick test
+    /// that decides about most cells of a node.
+    ///
+    /// The directions to the cell lie in a cone around that to its center. Where the sines of the radii of two cones add up
+    /// to less than that of the angle between their axes, or than 1 for an obtuse angle, the cones are apart.
+    fn is_aside(&self, corners: &[Vec3; 3]) -> bool {
+        let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
+        let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
+        let extent = self.triangle.vertices().iter().fold(0.0, |extent: f32, v| extent.max(v.abs().max_element()));
+        let feature = self.bright();
+        let (axis, center) = (Vec3::from_array(feature.axis), self.environment.local_direction(center));
+        let distance = math::sqrt(center.length_squared());
+        let reach = math::sqrt(radius2) + feature.reach() * distance + ASIDE_ROUNDING * extent;
+        let across2 = if axis.dot(center) < 0.0 { f32::INFINITY } else { axis.cross(center).length_squared() };
+        reach < distance && reach * reach < across2
+    }
+
+    /// Corners of a cell, relative to the shading point.
+    fn corners(&self, cell: LatticeCell) -> [Vec3; 3] {
+        let &[v0, v1, v2] = self.triangle.vertices();
+        cell.corners().map(|corner| {
+            let [b1, b2] = corner.to_barycentrics();
+            v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2
+        })
+    }
+
     /// Whether a cell is small compared with the feature.
     fn is_small(&self, corners: &[Vec3; 3]) -> bool {
         let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
@@ -145,7 +197,14 @@ impl CellTarget for FeatureView<'_> {
 
     fn child(&self, (): &(), _index: usize) {}
 
-    fn weigh(&self, at: LatticeCell, (): &mut ()) -> CellWeight {
-        CellWeight { weight: self.power(at), is_final: true }
+    fn weigh_children(&self, at: LatticeCell, (): &(), averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
+        *weights = core::array::from_fn(|i| {
+            let child = at.child(i);
+            if averages[i] == 0.0 || self.is_aside(&self.corners(child)) { 0.0 } else { self.power(child) }
+        });
+    }
+
+    fn is_final(&self, _at: LatticeCell, (): &mut (), _levels: Option<u32>) -> bool {
+        true
     }
 }

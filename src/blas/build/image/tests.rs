@@ -14,7 +14,7 @@ pub(super) const LOWER: [Vec2; 3] = [Vec2::new(0.0, 0.0), Vec2::new(1.0, 0.0), V
 pub(super) const UPPER: [Vec2; 3] = [Vec2::new(0.0, 0.0), Vec2::new(1.0, 1.0), Vec2::new(0.0, 1.0)];
 
 /// The averages on a point's way down.
-fn path(root: Root, pool: &[CellBlock], barycentrics: [f32; 2]) -> Vec<f32> {
+fn path(root: Root, pool: &[CellNode], barycentrics: [f32; 2]) -> Vec<f32> {
     let mut values = alloc::vec![root.average];
     let scale = if root.node == LEAF { 0.0 } else { root.average / mean(pool, root.node) };
     let (mut local, mut size) = (Lattice::from_barycentrics(barycentrics).0, LATTICE);
@@ -255,6 +255,6 @@ fn order_decides_who_gets_what_is_left() {
     for (tree, root) in trees.iter().zip(&roots) {
         assert_eq!(build(&mut pyramid, tree.uv, &mut alone).unwrap(), *root);
     }
-    assert_eq!(pyramid.extra, 0.0);
+    assert_eq!(pyramid.memory.extra, 0.0);
     assert!(together == alone);
 }
