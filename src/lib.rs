@@ -58,7 +58,7 @@
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
 //! BSDF samples, or with [`Environment::sample`].
 //!
-//! The repository has a guide for hosts, `docs/INTEGRATION.md`, with a table of mistakes and what they look like.
+//! The [`guide`] goes through the integration into a renderer, and has a table of mistakes and what they look like.
 //!
 //! # Scope and goals
 //!
@@ -127,6 +127,7 @@ mod geometry;
 mod light;
 mod math;
 mod parallel;
+mod progress;
 mod receiver;
 mod record;
 mod sampler;
@@ -142,10 +143,9 @@ mod warp;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-/// The steps of the guide.
-#[cfg(doctest)]
+#[cfg(any(doc, doctest))]
 #[doc = include_str!("../docs/INTEGRATION.md")]
-struct Integration;
+pub mod guide {}
 
 pub use blas::{Procedural, Texture};
 pub use env::{Environment, EnvironmentImage, EnvironmentSample, EnvironmentView, Poles};

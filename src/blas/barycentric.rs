@@ -56,6 +56,12 @@ impl Lattice {
         Self([LATTICE - i1 - i2, i1, i2])
     }
 
+    /// Returns the lattice point nearest to `[b1, b2]` among those strictly inside of the triangle.
+    #[inline(always)]
+    pub(crate) fn inside(b: [f64; 2]) -> Self {
+        Self(nearest_inside(LATTICE, b))
+    }
+
     /// The point's `[b1, b2]`, exactly.
     #[inline]
     pub(crate) fn to_barycentrics(self) -> [f32; 2] {
@@ -215,8 +221,13 @@ impl LatticeCell {
 /// preserves area, so stratified input gives stratified points. Any `u` is safe.
 #[inline]
 pub(crate) fn interior_point(size: u32, u: [f64; 2]) -> [u32; 3] {
+    nearest_inside(size, square_to_triangle(u))
+}
+
+/// The point nearest to `[b1, b2]` strictly inside of a cell that is `size >= 4` lattice units wide.
+#[inline(always)]
+fn nearest_inside(size: u32, [b1, b2]: [f64; 2]) -> [u32; 3] {
     debug_assert!(size >= 4);
-    let [b1, b2] = square_to_triangle(u);
     // Rounding to the nearest point, rather than shrinking the triangle by the rim, leaves the density inside exact.
     // The casts saturate, and take NaN to zero.
     let round = |b: f64| (b * f64::from(size) + 0.5) as u32;

@@ -29,7 +29,7 @@ pub(super) const DEFENSIVE_SHARE: f32 = 0.02;
 /// twentieth.
 ///
 /// Larger: the descent divides more cells, at the cost of time. Smaller: less of the contrast is followed.
-const CONSTANT_RATIO: f32 = 0.6;
+pub(super) const CONSTANT_RATIO: f32 = 0.6;
 
 /// Slack of the box for rounding, in units of the square. *Proved*: covers the errors of the map (2.5e-7 at worst), of
 /// the rotation and of the direction.
@@ -132,6 +132,26 @@ impl EnvironmentView<'_> {
         }
         // The filter reaches beyond the texels.
         RadianceBounds { mean: (sum / count).clamp(min, max), min, max }
+    }
+
+    /// Returns the range over texels that hold the box of this half side around a point of the square.
+    #[inline]
+    pub(super) fn range_of_box(&self, x: f32, y: f32, half: f32) -> [f32; 2] {
+        let depth = self.depth_of_side(2.0 * half);
+        if depth == 0 {
+            return self.ranges[0];
+        }
+        let size = 1_i32 << depth;
+        // As in `radiance_bounds`.
+        let texel = |coordinate: f32| ((coordinate + 1.0) * size as f32) as i32 - size;
+        let (x0, x1, y0, y1) = (texel(x - half), texel(x + half), texel(y - half), texel(y + half));
+        let (mut min, mut max) = (f32::INFINITY, 0.0_f32);
+        for (i, j) in [(x0, y0), (x1, y0), (x0, y1), (x1, y1)] {
+            let (i, j) = wrap_texel_log2(i, j, depth);
+            let [low, high] = self.range_at(depth, i, j);
+            (min, max) = (min.min(low), max.max(high));
+        }
+        [min, max]
     }
 
     /// Depth of the finest level whose texels are at least as wide as `side`, so that it touches 2x2 at most.

@@ -8,6 +8,7 @@ use crate::record::Filter;
 /// It matters within half a texel of a pole. Choose what the host's own lookup does, so that no place where the host
 /// sees light has a density of zero. It makes no difference with [`Filter::Nearest`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Poles {
     /// Rows end: beyond a pole the row next to the pole is repeated.
     #[default]

@@ -14,6 +14,7 @@ mod feature_texel;
 mod feature_tree;
 mod features;
 mod image;
+mod lanes;
 mod lat_long;
 mod pyramid;
 mod resample;
@@ -30,6 +31,7 @@ pub use descend::EnvironmentSample;
 pub(crate) use feature_texel::FeatureTexel;
 pub(crate) use feature_tree::FeatureNode;
 pub use image::{EnvironmentImage, Poles};
+pub(crate) use lanes::texel_of;
 pub use view::{Environment, EnvironmentView};
 pub(crate) use weighted::DirectionDistribution;
 

@@ -10,4 +10,4 @@ pub(crate) use aabb::Aabb;
 pub(crate) use cone::{Cone, angle};
 pub(crate) use horizon::{HORIZON_ROUNDING, horizon, is_below};
 pub(crate) use polygon::Polygon;
-pub(crate) use triangle::{Triangle, intersect, normal_and_area, subdivision_centers};
+pub(crate) use triangle::{Triangle, cross_plane, intersect, normal_and_area, subdivision_centers};

@@ -54,19 +54,23 @@ pub(crate) fn normal_and_area(cross: DVec3, double_area: f64) -> Option<(Vec3, f
 /// Barycentrics `b1`, `b2` of the point where the ray from the origin along `direction` crosses the triangle with
 /// these vertices, or `None` if it does not. After Möller and Trumbore (1997).
 pub(crate) fn intersect(vertices: [DVec3; 3], direction: Vec3) -> Option<[f32; 2]> {
+    let ([b1, b2], t) = cross_plane(vertices, direction.as_dvec3())?;
+    (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0).then_some([b1 as f32, b2 as f32])
+}
+
+/// Returns the barycentrics `b1`, `b2` of the point where the line from the origin along `direction` crosses the plane of a
+/// triangle, and the point's distance in units of `direction`. `None` where they are parallel.
+#[inline(always)]
+pub(crate) fn cross_plane(vertices: [DVec3; 3], direction: DVec3) -> Option<([f64; 2], f64)> {
     let [a, b, c] = vertices;
-    let direction = direction.as_dvec3();
     let (e1, e2) = (b - a, c - a);
     let p = direction.cross(e2);
     let determinant = e1.dot(p);
     if determinant == 0.0 {
         return None;
     }
-    let b1 = -a.dot(p) / determinant;
     let q = (-a).cross(e1);
-    let b2 = direction.dot(q) / determinant;
-    let t = e2.dot(q) / determinant;
-    (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0).then_some([b1 as f32, b2 as f32])
+    Some(([-a.dot(p) / determinant, direction.dot(q) / determinant], e2.dot(q) / determinant))
 }
 
 /// Returns the barycentrics `[b1, b2]` of the centers of the `n²` congruent triangles that a triangle is divided into.

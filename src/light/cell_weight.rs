@@ -74,6 +74,15 @@ impl TriangleView<'_> {
         low.abs().min(high.abs()) >= CONSTANT_COSINE * top && low * high >= 0.0 || top <= LOW_COSINE * self.highest
     }
 
+    /// Whether the geometry is nearly constant over the whole triangle.
+    #[inline]
+    pub(super) fn has_constant_geometry(&self) -> bool {
+        let [a, b, c] = self.vertices;
+        let distance2 = ((a + b + c) * (1.0 / 3.0)).length_squared();
+        self.radius2 <= CONSTANT_GEOMETRY * distance2
+            && self.has_constant_cosine(self.vertices.map(|v| self.receiver_normal.dot(v)))
+    }
+
     /// Weighs cells of one size. With `constant_radiance` what is seen behind them is known to be the same everywhere.
     #[inline(always)]
     fn weigh_cells<const COUNT: usize>(

@@ -11,10 +11,12 @@ mod energy;
 mod illumination;
 mod mesh;
 mod meshes;
+mod spherical_grid;
 mod triangle;
 mod triangle_view;
 mod update;
 mod validate;
+mod visible_part;
 
 use glam::{DVec3, Vec3};
 
@@ -89,6 +91,17 @@ pub(crate) struct LightPoint {
     pub(crate) point: Lattice,
 }
 
+/// A point of a light that was drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DrawnPoint {
+    pub(crate) point: Lattice,
+    /// Relative to the shading point. The lattice's own point, except where the lattice is too coarse to tell directions
+    /// apart.
+    pub(crate) relative: DVec3,
+    /// Density per solid angle with which the lattice's point is drawn.
+    pub(crate) pdf: f64,
+}
+
 /// What a light of any kind says of itself.
 pub(crate) trait LightKind {
     /// Returns the light's number among all that were added.
@@ -122,9 +135,8 @@ pub(crate) trait LightKind {
 
 /// What a light of any kind says of itself to a shading point.
 pub(crate) trait LightViewKind {
-    /// Draws a point of the light with its density per solid angle; `None` where nothing can arrive from the part of the
-    /// light that the variates lead to.
-    fn sample(&self, u: [Variate; 2]) -> Option<(Lattice, f64)>;
+    /// Draws a point of the light; `None` where nothing can arrive from the part of the light that the variates lead to.
+    fn sample(&self, u: [Variate; 2]) -> Option<DrawnPoint>;
 
     /// Returns the density per solid angle with which [`Self::sample`] draws a point, if that is positive.
     fn pdf(&self, point: Lattice) -> Option<f64>;
@@ -200,7 +212,7 @@ impl LightKind for Light<'_> {
 
 impl LightViewKind for LightView<'_> {
     #[inline(always)]
-    fn sample(&self, u: [Variate; 2]) -> Option<(Lattice, f64)> {
+    fn sample(&self, u: [Variate; 2]) -> Option<DrawnPoint> {
         dispatch!(LightView, self, kind => kind.sample(u))
     }
 

@@ -4,6 +4,7 @@
 use glam::Vec3;
 
 use crate::geometry::HORIZON_ROUNDING;
+use crate::math::at_least;
 
 /// Least expected cosine of a cluster that is not culled, at the receiver and at the lights. It keeps every light possible
 /// that may be visible.
@@ -41,5 +42,12 @@ impl ReceiverLanes {
     ) -> Self {
         let slack = HORIZON_ROUNDING * horizon.abs().element_sum();
         Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack }
+    }
+
+    /// Returns the mean weight of a small cell of directions by the cosine of its central direction to the normal. `least`
+    /// is that of [`ReceiverKind::least_over_directions`](super::ReceiverKind::least_over_directions).
+    #[inline(always)]
+    pub(crate) fn weight_of_cell(&self, cosine: f32, least: f32) -> f32 {
+        at_least(f32::from_bits(cosine.to_bits() & self.cosine_bits), least)
     }
 }

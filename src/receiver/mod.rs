@@ -138,6 +138,10 @@ pub(crate) trait ReceiverKind: Copy {
     /// relative to the receiver.
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32;
 
+    /// Returns the least mean weight of a small cell of directions, of which the central one is weighed
+    /// ([`ReceiverLanes::weight_of_cell`]). It stands in for what the other directions of the cell weigh.
+    fn least_over_directions(self, solid_angle: f32) -> f32;
+
     /// Returns what the loop over the lanes of a node needs.
     fn lanes(self, position: Vec3) -> ReceiverLanes;
 }
@@ -200,6 +204,11 @@ impl ReceiverKind for Receiver {
 
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
         dispatch!(self, kind => kind.irradiance(vertices))
+    }
+
+    #[inline(always)]
+    fn least_over_directions(self, solid_angle: f32) -> f32 {
+        dispatch!(self, kind => kind.least_over_directions(solid_angle))
     }
 
     #[inline(always)]

@@ -7,6 +7,12 @@ use super::lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use super::{CornerHeights, ReceiverKind};
 use crate::geometry::is_below;
 
+/// Least cosine that a cell of directions above the horizon is weighed by.
+///
+/// A guard against rounding: cells at the horizon have centers of about 1e-2. Larger values send samples to the horizon;
+/// smaller ones leave a cell too few where rounding has taken its center below.
+const LEAST_CELL_COSINE: f32 = 1e-4;
+
 #[derive(Clone, Copy)]
 pub(super) struct Surface {
     pub(super) normal: Vec3,
@@ -53,6 +59,12 @@ impl ReceiverKind for Surface {
 
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
         lambert(self.normal, vertices)
+    }
+
+    /// Cells of directions are cut off at the horizon, so that the cosine of the center is about the mean.
+    #[inline(always)]
+    fn least_over_directions(self, _solid_angle: f32) -> f32 {
+        LEAST_CELL_COSINE
     }
 
     #[inline(always)]

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::lambert::lambert;
 use super::lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 use super::{CornerHeights, ReceiverKind};
+use crate::math;
 
 #[derive(Clone, Copy)]
 pub(super) struct Transmissive {
@@ -51,6 +52,12 @@ impl ReceiverKind for Transmissive {
 
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
         lambert(self.normal, vertices) + lambert(-self.normal, vertices)
+    }
+
+    /// The mean of a square cell that the plane halves.
+    #[inline(always)]
+    fn least_over_directions(self, solid_angle: f32) -> f32 {
+        0.25 * math::sqrt(solid_angle)
     }
 
     #[inline(always)]

@@ -53,6 +53,11 @@ impl ReceiverKind for Volume {
     }
 
     #[inline(always)]
+    fn least_over_directions(self, _solid_angle: f32) -> f32 {
+        1.0
+    }
+
+    #[inline(always)]
     fn lanes(self, position: Vec3) -> ReceiverLanes {
         // A least cosine of 1 replaces the cosine.
         ReceiverLanes::new(position, Vec3::ZERO, u32::MAX, 1.0, Vec3::ZERO, 1.0)

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::light::Lights;
 use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
-use crate::technique::LightScene;
+use crate::technique::{LightScene, Viewpoint};
 use crate::tlas::Tlas;
 
 /// All lights of a scene, ready to be sampled.
@@ -65,18 +65,21 @@ impl LightSampler {
     #[inline]
     #[must_use]
     pub fn as_view(&self) -> LightSamplerView<'_> {
-        LightSamplerView { scene: self.scene() }
-    }
-
-    #[inline(always)]
-    pub(super) fn scene(&self) -> LightScene<'_> {
-        LightScene { tlas: self.tlas.view(), lights: self.lights.view(), environment: self.environment.as_view() }
+        let (tlas, lights, environment) = (self.tlas.view(), self.lights.view(), self.environment.as_view());
+        LightSamplerView { scene: LightScene { tlas, lights, environment } }
     }
 
     /// Returns the lights as seen from a shading point.
     #[inline(always)]
     pub fn at(&self, x: &ShadingPoint) -> PointSampler<'_> {
-        PointSampler::new(self.scene(), x)
+        PointSampler::new(Viewpoint {
+            scene: LightScene {
+                tlas: self.tlas.view(),
+                lights: self.lights.view(),
+                environment: self.environment.as_view(),
+            },
+            x: *x,
+        })
     }
 
     /// Draws one sample for each shading point and its random numbers: see [`LightSamplerView::sample_many`].
@@ -127,7 +130,7 @@ impl<'a> LightSamplerView<'a> {
     /// Returns the lights as seen from a shading point.
     #[inline(always)]
     pub fn at(&self, x: &ShadingPoint) -> PointSampler<'a> {
-        PointSampler::new(self.scene, x)
+        PointSampler::new(Viewpoint { scene: self.scene, x: *x })
     }
 
     /// Returns the environment, for its own sampling.

@@ -6,7 +6,7 @@ use super::finite::{to_finite, to_positive};
 use crate::light::{LightPoint, LightView, LightViewKind};
 use crate::receiver::ShadingPoint;
 use crate::record::{Hit, LightSample, TriangleId};
-use crate::technique::{Drawn, LightScene, Mixed, Mixture, Variates, Viewpoint};
+use crate::technique::{Drawn, Mixed, Mixture, Variates, Viewpoint};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
 
@@ -22,10 +22,12 @@ pub struct PointSampler<'a> {
 }
 
 impl<'a> PointSampler<'a> {
+    /// Returns the sampler of a viewpoint.
+    ///
+    /// To be called with a literal, and itself a literal: what goes through a variable is copied, and a sampler is large.
     #[inline(always)]
-    pub(super) fn new(scene: LightScene<'a>, x: &ShadingPoint) -> Self {
-        let at = Viewpoint { scene, x: *x };
-        Self { at, mixture: Mixture::new(&at) }
+    pub(super) fn new(at: Viewpoint<'a>) -> Self {
+        Self { mixture: Mixture::new(&at), at }
     }
 
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the
@@ -162,7 +164,7 @@ impl<'a> PointSampler<'a> {
 /// Everything that a host needs to know of a point that was drawn.
 #[inline(always)]
 fn light_sample(at: &Viewpoint<'_>, drawn: &Drawn, view: &LightView<'_>) -> Option<LightSample> {
-    let relative = view.point(drawn.point.point);
+    let relative = drawn.relative;
     let distance = relative.length();
     let positive = drawn.pdf > 0.0 && distance > 0.0 && distance.is_finite();
     positive.then(|| LightSample {

@@ -2,7 +2,9 @@
 
 use super::features::VisibleFeatures;
 use super::trees::{self, Trees};
-use super::{Density, Technique, Variates, Viewpoint};
+use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
+use glam::DVec3;
+
 use crate::light::{LightPoint, LightView};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::{Variate, pick_pair};
@@ -48,10 +50,19 @@ struct Shares {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drawn {
     pub(crate) point: LightPoint,
+    /// The same relative to the shading point.
+    pub(crate) relative: DVec3,
     /// Probability of the light by the trees, or the expected number of visits where the tree is split.
     pub(crate) pmf: f64,
     /// Per solid angle.
     pub(crate) pdf: f64,
+}
+
+impl Drawn {
+    #[inline(always)]
+    fn new(PlacedPoint { point, relative }: PlacedPoint, Density { pmf, pdf }: Density) -> Self {
+        Self { point, relative, pmf, pdf }
+    }
 }
 
 impl Mixture {
@@ -122,7 +133,9 @@ impl Mixed<'_> {
                 return self.sample_feature(at, u, then);
             }
         }
-        self.trees.sample(at, u, |point, trees, view| then(&self.complete(at, point, trees, view), view))
+        self.trees.sample(at, u, |point, trees, view| {
+            then(&Drawn::new(point, self.complete(at, point.point, trees, view)), view)
+        })
     }
 
     /// Draws a point on a light that the trees have chosen with this probability, or visit this many times.
@@ -134,7 +147,9 @@ impl Mixed<'_> {
         u: [Variate; 2],
         then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
-        self.trees.sample_on(at, leaf, pmf, u, |point, trees, view| then(&self.complete(at, point, trees, view), view))
+        self.trees.sample_on(at, leaf, pmf, u, |point, trees, view| {
+            then(&Drawn::new(point, self.complete(at, point.point, trees, view)), view)
+        })
     }
 
     /// Draws a point on a portal towards a feature, if any is visible.
@@ -147,8 +162,8 @@ impl Mixed<'_> {
     ) -> Option<R> {
         let features = self.mixture.features.as_ref()?;
         features.sample(at, u, |point, features, view| {
-            let trees = self.trees.density(at, point, view);
-            then(&self.mix(point, trees, features), view)
+            let trees = self.trees.density(at, point.point, view);
+            then(&Drawn::new(point, self.mix(trees, features)), view)
         })
     }
 
@@ -164,16 +179,16 @@ impl Mixed<'_> {
 
     /// Adds the density by the features to that by the trees.
     #[inline(always)]
-    fn complete(&self, at: &Viewpoint<'_>, point: LightPoint, trees: Density, view: &LightView<'_>) -> Drawn {
+    fn complete(&self, at: &Viewpoint<'_>, point: LightPoint, trees: Density, view: &LightView<'_>) -> Density {
         match &self.mixture.features {
-            None => self.mix(point, trees, Density { pmf: 0.0, pdf: 0.0 }),
-            Some(features) => self.mix(point, trees, features.density(at, point, view)),
+            None => self.mix(trees, Density { pmf: 0.0, pdf: 0.0 }),
+            Some(features) => self.mix(trees, features.density(at, point, view)),
         }
     }
 
     #[inline(always)]
-    fn mix(&self, point: LightPoint, trees: Density, features: Density) -> Drawn {
+    fn mix(&self, trees: Density, features: Density) -> Density {
         let pdf = self.shares.trees * trees.pdf + self.shares.features * features.pdf;
-        Drawn { point, pmf: trees.pmf * self.shares.trees, pdf }
+        Density { pmf: trees.pmf * self.shares.trees, pdf }
     }
 }

@@ -10,6 +10,8 @@ mod mixture;
 mod trees;
 mod viewpoint;
 
+use glam::DVec3;
+
 use crate::light::{LightPoint, LightView};
 use crate::warp::{Variate, seed};
 
@@ -43,6 +45,14 @@ pub(crate) struct Density {
     pub(crate) pdf: f64,
 }
 
+/// A point on a light that was drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlacedPoint {
+    pub(crate) point: LightPoint,
+    /// Relative to the shading point.
+    pub(crate) relative: DVec3,
+}
+
 /// One way to choose a point on the lights.
 pub(crate) trait Technique {
     /// Returns what the densities of this technique integrate to. What they are divided by is left to the mixture, so that
@@ -57,7 +67,7 @@ pub(crate) trait Technique {
         &self,
         at: &Viewpoint<'_>,
         u: Variates,
-        then: impl FnOnce(LightPoint, Density, &LightView<'_>) -> Option<R>,
+        then: impl FnOnce(PlacedPoint, Density, &LightView<'_>) -> Option<R>,
     ) -> Option<R>;
 
     /// Returns the density of a point on a light, of which the view is given.

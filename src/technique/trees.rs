@@ -1,7 +1,7 @@
 //! The tree over the lights, then the tree over the texture of the one that was chosen.
 
-use super::{Density, Technique, Variates, Viewpoint};
-use crate::light::{LightPoint, LightView, LightViewKind};
+use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
+use crate::light::{DrawnPoint, LightPoint, LightView, LightViewKind};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::Variate;
 
@@ -31,13 +31,14 @@ impl Trees<'_> {
         leaf: u32,
         pmf: f64,
         u: [Variate; 2],
-        then: impl FnOnce(LightPoint, Density, &LightView<'_>) -> Option<R>,
+        then: impl FnOnce(PlacedPoint, Density, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
         // By reference: what `?` moves is copied.
         let view = &at.view(leaf);
         let view = view.as_ref()?;
-        let (point, pdf) = view.sample(u)?;
-        then(LightPoint { leaf, point }, Density { pmf, pdf: pmf * pdf }, view)
+        let DrawnPoint { point, relative, pdf } = view.sample(u)?;
+        let point = PlacedPoint { point: LightPoint { leaf, point }, relative };
+        then(point, Density { pmf, pdf: pmf * pdf }, view)
     }
 }
 
@@ -51,7 +52,7 @@ impl Technique for Trees<'_> {
         &self,
         at: &Viewpoint<'_>,
         u: Variates,
-        then: impl FnOnce(LightPoint, Density, &LightView<'_>) -> Option<R>,
+        then: impl FnOnce(PlacedPoint, Density, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
         let (leaf, pmf) = at.scene.tlas.sample(at, self.first, u.choice)?;
         self.sample_on(at, leaf, pmf, u.point, then)

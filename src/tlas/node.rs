@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Bit of [`Node::normals`] that marks a two-sided light. *Format.*
-pub(super) const TWO_SIDED: u32 = 1 << 31;
+pub(super) const LANE_TWO_SIDED: u32 = 1 << 31;
 /// Largest component of a normal, in the ten bits that it has. *Format.*
 pub(super) const NORMAL_STEPS: f32 = 511.0;
 /// Code of a cone of normals so wide that something always faces the shading point. *Format.*
@@ -33,7 +33,7 @@ pub(crate) struct Node<const N: usize> {
     /// The first child that is a leaf.
     pub(super) first_leaf: u32,
     /// Direction of the mean normal, which is the axis of the cone of normals as well: ten bits a component, and
-    /// [`TWO_SIDED`].
+    /// [`LANE_TWO_SIDED`].
     pub(super) normals: [u32; N],
     /// Energies; zero where there is no child.
     pub(super) energies: [u16; N],
@@ -156,7 +156,7 @@ impl<const N: usize> Node<N> {
     }
 
     pub(super) fn is_two_sided(&self, lane: usize) -> bool {
-        self.normals[lane] & TWO_SIDED != 0
+        self.normals[lane] & LANE_TWO_SIDED != 0
     }
 
     /// Returns the least and largest coordinates of all boxes, by axis. Each is rounded once, so that a box still holds what it

@@ -44,6 +44,19 @@ pub(crate) fn keep_possible<const N: usize>(weights: &mut [f32; N], possible: im
     keep_least(weights, largest);
 }
 
+/// [`keep_possible`] of what is positive.
+#[inline(always)]
+pub(crate) fn keep_positive<const N: usize>(weights: &mut [f32; N]) {
+    let mut largest = 0_i32;
+    for weight in weights.iter_mut() {
+        *weight = only_if(*weight > 0.0, within_range(*weight));
+        // Signed, as more machines compare such vectors.
+        let bits = weight.to_bits() as i32;
+        largest = if bits > largest { bits } else { largest };
+    }
+    keep_least(weights, largest as u32);
+}
+
 /// Returns the nearest weight for which sums and quotients are finite; also for the NaN of 0 · ∞.
 #[inline(always)]
 pub(crate) fn within_range(weight: f32) -> f32 {

@@ -8,7 +8,7 @@
 //! Only additions, multiplications, divisions and square roots are used, so that the results do not depend on
 //! the library that the float functions come from.
 
-use crate::math::{limit, sqrt};
+use crate::math::{at_least, at_most, limit, sqrt};
 use core::f32::consts::{FRAC_1_SQRT_2, TAU};
 use glam::{Vec2, Vec3};
 
@@ -55,6 +55,37 @@ pub(crate) fn sphere_to_square(direction: Vec3) -> Vec2 {
     let (u, v) = if direction.z < 0.0 { (1.0 - b, 1.0 - a) } else { (a, b) };
     let place = |distance: f32, side: f32| limit(0.5 + 0.5 * distance.copysign(side), 1.0);
     Vec2::new(place(u, direction.x), place(v, direction.y))
+}
+
+/// Largest coordinate that [`sphere_to_square_quickly`] returns. *Proved*: it is in the last texel of every level that a
+/// pyramid may have, 2^13 texels a side.
+///
+/// Larger than 1 - 2^-13 only: points at the edge would lie in no texel. Smaller: more points are moved.
+const LAST: f32 = 1.0 - 1.0 / 131_072.0;
+
+/// Bound on how far a point of [`sphere_to_square_quickly`] is from the exact map, by coordinate. *Measured* over 2e7
+/// directions: 3.7e-6 of the polynomial, to which [`LAST`] adds 7.6e-6; the rest is for the rounding of directions.
+///
+/// Larger: coarser bounds of small regions. Smaller: a lit texel could be missed.
+pub(crate) const QUICK_ERROR: f32 = 2e-5;
+
+/// Returns the point of the unit square that a unit direction maps to: quicker than [`sphere_to_square`], and within
+/// [`QUICK_ERROR`] of the exact map. Coordinates are in `[0, 1)`.
+#[inline(always)]
+pub(crate) fn sphere_to_square_quickly([x, y, z]: [f32; 3]) -> [f32; 2] {
+    let (ax, ay) = (x.abs(), y.abs());
+    let r = sqrt((x * x + y * y) / (1.0 + z.abs()));
+    let (small, large) = (at_most(ax, ay), at_least(ax, ay));
+    let t = small / at_least(large, f32::MIN_POSITIVE);
+    let s = t * t;
+    // The arc tangent in quarter turns.
+    let angle = t * (0.636_534_5 + s * (-0.210_275_2 + s * (0.114_681_3 + s * (-0.054_197_4 + s * 0.013_264_0))));
+    let minor = angle * r;
+    let major = r - minor;
+    let (a, b) = if ay > ax { (minor, major) } else { (major, minor) };
+    let (u, v) = if z < 0.0 { (1.0 - b, 1.0 - a) } else { (a, b) };
+    let place = |distance: f32, side: f32| at_least(at_most(0.5 + 0.5 * distance.copysign(side), LAST), 0.0);
+    [place(u, x), place(v, y)]
 }
 
 /// Sine and cosine of `quarter` quarter turns, for `quarter` in `[0, 1/2]`. Relative error below 1e-7.

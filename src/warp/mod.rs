@@ -2,8 +2,12 @@
 
 pub(crate) mod discrete;
 pub(crate) mod equal_area;
+mod spherical_triangle;
 pub(crate) mod triangle;
 pub(crate) mod variate;
 
-pub(crate) use discrete::{keep_least, keep_possible, pick, pick_pair, pick_wide, pmf, pmf_wide, sum, within_range};
+pub(crate) use discrete::{
+    keep_least, keep_positive, keep_possible, pick, pick_pair, pick_wide, pmf, pmf_wide, sum, within_range,
+};
+pub(crate) use spherical_triangle::{COLUMNS, SphericalColumns, SphericalTriangle};
 pub(crate) use variate::{Variate, seed};

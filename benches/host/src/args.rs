@@ -14,6 +14,7 @@ cargo bench -p fanlight-host --bench host -- [OPTIONS]
   --bounces N     only this number of surfaces that light touches (1 and 5 without it); may be repeated
   --seeds N       images of each method (8; 4 with --quick)
   --seconds S     CPU time of each image (3; 0.1 with --quick)
+  --reference S   CPU time of each reference that is rendered (64 times that of an image, and never less)
   --threads N     threads that compute references (all cores); the measurement runs on one
   --quick         a few scenes that need no data, in less than two minutes
   --validate      compares with the references of another renderer instead
@@ -29,6 +30,8 @@ pub(crate) struct Args {
     pub(crate) seeds: u32,
     /// CPU time of an image.
     pub(crate) seconds: f64,
+    /// CPU time of a reference, if not the least.
+    pub(crate) reference: f64,
     pub(crate) threads: usize,
     pub(crate) quick: bool,
     pub(crate) validate: bool,
@@ -47,6 +50,7 @@ impl Args {
             bounces: Vec::new(),
             seeds: 0,
             seconds: 0.0,
+            reference: 0.0,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             quick: false,
             validate: false,
@@ -61,6 +65,7 @@ impl Args {
                 Long("bounces") => args.bounces.push(parser.value()?.parse()?),
                 Long("seeds") => seeds = Some(parser.value()?.parse()?),
                 Long("seconds") => seconds = Some(parser.value()?.parse()?),
+                Long("reference") => args.reference = parser.value()?.parse()?,
                 Long("threads") => args.threads = parser.value()?.parse()?,
                 Long("quick") => args.quick = true,
                 Long("validate") => args.validate = true,

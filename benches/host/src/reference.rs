@@ -21,7 +21,7 @@ const VERSION: u32 = 1;
 
 /// Returns a reference that is not known from elsewhere: the one of an earlier run if it is good enough, or a new one.
 pub(crate) fn compute(scene: &str, world: &World, bounces: u32, args: &Args) -> Result<Reference, Error> {
-    let seconds = EFFORT * args.seconds;
+    let seconds = (EFFORT * args.seconds).max(args.reference);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/host");
     let image = folder.join(format!("{scene}_{bounces}.exr"));
     let notes = image.with_extension("json");

@@ -109,19 +109,20 @@ impl Report {
         Ok(())
     }
 
-    /// Prints one line a scene: fanlight against the best competitor.
+    /// Prints one line a scene: fanlight against the best competitor, and the noise of the reference over fanlight's error.
     fn print_summary(&self) {
-        println!("\n| scene | bounces | best competitor | fanlight over it | 95 % | call, rays |");
-        println!("| --- | ---: | --- | ---: | ---: | ---: |");
+        println!("\n| scene | bounces | best competitor | fanlight over it | 95 % | call, rays | reference's noise |");
+        println!("| --- | ---: | --- | ---: | ---: | ---: | ---: |");
         for row in self.rows.iter().filter(|row| row.method == "fanlight") {
             let is_best = |other: &&Row| other.is_best && other.scene == row.scene && other.bounces == row.bounces;
             let best = self.rows.iter().find(is_best).map_or("none", |best| best.method);
             let Ratio { mean, low, high } = row.over_best;
             println!(
-                "| {} | {} | {best} | {mean:.2} | {low:.2} to {high:.2} | {:.1} |",
+                "| {} | {} | {best} | {mean:.2} | {low:.2} to {high:.2} | {:.1} | {:.0} % |",
                 row.scene,
                 row.bounces,
-                row.cost.lit_ns / row.ray_ns
+                row.cost.lit_ns / row.ray_ns,
+                100.0 * row.reference_noise / row.rel_mse
             );
         }
     }

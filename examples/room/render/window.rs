@@ -58,7 +58,7 @@ fn star() -> Vec<Vec2> {
     let step = PI / 5.0;
     let outer = (1.0 / (5.0 * INNER * step.sin())).sqrt();
     let point = |k: u8| {
-        let radius = if k % 2 == 0 { outer } else { INNER * outer };
+        let radius = if k % 2 == 1 { INNER * outer } else { outer };
         let (sin, cos) = (0.5 * PI + step * f32::from(k)).sin_cos();
         CENTER + radius * vec2(sin, cos)
     };

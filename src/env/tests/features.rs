@@ -77,7 +77,7 @@ fn of_too_many_lamps_the_faintest_stay_in_the_rest() {
     let texels = &view.means[view.means.len() - size * size..];
     let limits = FeatureLimits { features: 30, ..FeatureLimits::default() };
     let image = EnvironmentImage::equal_area(size, texels).filter(Filter::Nearest);
-    let few = Environment::with_limits(&image, &limits).unwrap();
+    let few = Environment::with_limits(&image, &limits, None).unwrap();
     let few = few.as_view();
     few.validate().unwrap();
     assert_eq!(count(&few), 30);

@@ -13,7 +13,7 @@ mod tests;
 mod texel_cut;
 mod view;
 
-use super::{Density, Technique, Variates, Viewpoint};
+use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
 use crate::blas::Lattice;
 use crate::env::FeatureNode;
 use crate::light::{LightKind, LightPoint, LightView, LightViewKind};
@@ -100,13 +100,13 @@ impl Technique for VisibleFeatures {
         &self,
         at: &Viewpoint<'_>,
         mut u: Variates,
-        then: impl FnOnce(LightPoint, Density, &LightView<'_>) -> Option<R>,
+        then: impl FnOnce(PlacedPoint, Density, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
         let index = pick(self.weights(), self.total(), &mut u.choice);
         let point = self.point(at, index, u.point)?;
-        let view = &at.view(point.leaf);
-        let view = view.as_ref()?;
-        then(point, self.density(at, point, view), view)
+        let view = at.view(point.leaf)?;
+        let relative = view.point(point.point);
+        then(PlacedPoint { point, relative }, self.density(at, point, &view), &view)
     }
 
     #[inline]

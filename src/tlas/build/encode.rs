@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, angle};
 use crate::math;
-use crate::tlas::node::{ALL, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
+use crate::tlas::node::{ALL, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
 
 /// Steps along each extent of a node. *Proved*: a box that fills the node has 253 halves of a step, the rounding of its
 /// center adds one and the rounding up of the halves another, and 255 is the largest code. Fewer steps make all boxes
@@ -79,7 +79,7 @@ impl<const N: usize> Node<N> {
         let code = |value: f32| (value * NORMAL_SCALE + 0.5f32.copysign(value)) as i32;
         let [x, y, z] = direction.to_array().map(|value| code(value) as u32 & 0x3ff);
         let normal = x | y << 10 | z << 20;
-        let side = if bounds.two_sided { TWO_SIDED } else { 0 };
+        let side = if bounds.two_sided { LANE_TWO_SIDED } else { 0 };
         self.normals[lane] = normal | side;
         self.lengths[lane] = (255.0 * length + 0.5) as u8;
         let axis = Vec3::from_array([0, 1, 2].map(|axis| Self::component(normal, axis))).normalize_or_zero();

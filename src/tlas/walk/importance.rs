@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::math::{self, at_least, only_if};
 use crate::receiver::{LEAST_CLUSTER_COSINE, ReceiverLanes, ShadingPoint};
-use crate::tlas::node::{ALL, Child, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, TWO_SIDED, WIDE, wide};
+use crate::tlas::node::{ALL, Child, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
 use crate::warp::{keep_least, within_range};
 
 /// What the tree asks of the level above about its leaves and about what they show.
@@ -182,7 +182,7 @@ impl<const N: usize> Node<N> {
             let side = f32::from_bits(normal.dot(to_mean).to_bits() & x.cosine_bits);
             let receiver = at_least(clamped_mean(side, RECEIVER_VARIANCE_SHARE * variance), x.least_cosine * distance);
             let facing = length * (-1.0 / (255.0 * NORMAL_STEPS)) * axis.dot(to_mean);
-            let facing = f32::from_bits(facing.to_bits() & !(bits & TWO_SIDED));
+            let facing = f32::from_bits(facing.to_bits() & !(bits & LANE_TWO_SIDED));
             let loss = NORMAL_VARIANCE_SHARE - length * length * (NORMAL_VARIANCE_SHARE / (255.0 * 255.0));
             let spread = loss * squared + EMITTER_VARIANCE_SHARE * variance;
             let emitter = at_least(clamped_mean(facing, spread), LEAST_CLUSTER_COSINE * distance);
