@@ -21,7 +21,7 @@ const BLOCK_REACH: f32 = 0.3;
 /// sun.
 ///
 /// Larger: more directions that miss the opening at its edges. Smaller: more blocks.
-const BLOCK_MARGIN: f32 = 0.02;
+const BLOCK_MARGIN: f32 = 0.002;
 
 /// A cell of the quadtree, with the feature's texels in it.
 #[derive(Clone, Copy, Debug)]

@@ -47,13 +47,17 @@ impl Wall {
     }
 
     fn build(self) -> LightSampler {
+        self.portal_to(environment())
+    }
+
+    fn portal_to(self, environment: Environment) -> LightSampler {
         // Thirty-two texels to a hole: of those on its edges, the tree over the texture knows only the mean.
         let side = if let Self::Clipped(n) = self { 64 * n as usize } else { 1 };
         let mask: Vec<f32> = (0..side * side)
             .map(|k| f32::from(u8::from([k % side, k / side].iter().all(|texel| texel % 64 < 32))))
             .collect();
         let mask = Texture::new(side, side, &mask).expect("a mask").filter(Filter::Nearest);
-        let mut builder = LightSampler::builder().environment(environment());
+        let mut builder = LightSampler::builder().environment(environment);
         let mask = Weight::Texture(builder.add_texture(mask));
         let mut add = |from: [f32; 2], to: [f32; 2], y: f32, weight: Weight| {
             let corner = |x: f32, z: f32| Vec3::new(x, y, 1.5 + z);
@@ -222,4 +226,61 @@ fn split_samples_have_the_density_that_pdf_split_finds() {
         }
     }
     assert!(drawn > 400 * points().len(), "only {drawn} samples");
+}
+
+/// A dim sky with `count` bright lamps of 3 x 3 texels, all of which are seen through the window.
+fn lamps(count: usize) -> Environment {
+    let (width, height) = (1024_usize, 512_usize);
+    let mut image = vec![0.1; width * height];
+    for i in 0..count {
+        let (column, row) = ((i % 8) as f32, (i / 8) as f32);
+        let direction = Vec3::new(-0.42 + 0.12 * column, 1.5, 0.62 + 0.11 * row).normalize();
+        let (theta, phi) = (direction.z.acos(), (-direction.y).atan2(direction.x).rem_euclid(core::f32::consts::TAU));
+        let x = (phi / core::f32::consts::TAU * width as f32) as usize;
+        let y = (theta / core::f32::consts::PI * height as f32) as usize;
+        for (dx, dy) in (0..9).map(|k| (k % 3, k / 3)) {
+            image[(y + dy - 1) * width + x + dx - 1] = 1000.0;
+        }
+    }
+    Environment::from_lat_long(width, height, &image, Filter::Nearest).expect("the texels are finite")
+}
+
+#[test]
+fn any_number_of_lamps_is_sampled_as_well_as_a_few() {
+    let window = Wall::Window;
+    let x = ShadingPoint::surface(Vec3::new(0.0, -1.5, 0.5), Vec3::new(0.0, 0.6, 0.8));
+    let is_open = |direction: Vec3| {
+        let hit = x.position + direction * (1.5 / direction.y);
+        direction.y > 0.0 && window.is_open(hit.x, hit.z - 1.5)
+    };
+    let mut pcg = Pcg32::new(3, 31);
+    let mut before: Option<f64> = None;
+    for count in [1, 2, 4, 8, 9, 10, 16, 17, 32, 33, 64] {
+        let environment = lamps(count);
+        let n = 4000;
+        let (mean, error) = estimate(4 * n, || {
+            let [u, v, _] = pcg.cube();
+            let sample = environment.sample([u, v]).expect("the sky is not black");
+            if !is_open(sample.direction) {
+                return 0.0;
+            }
+            f64::from(sample.radiance * x.cosine(sample.direction) / sample.pdf)
+        });
+        let lights = window.portal_to(environment.clone());
+        let here = lights.at(&x);
+        let (found, own_error) = estimate(n, || {
+            let Some(sample) = here.sample(pcg.cube()) else { return 0.0 };
+            let radiance = environment.radiance(sample.direction) * f32::from(u8::from(is_open(sample.direction)));
+            f64::from(radiance * x.cosine(sample.direction) / here.pdf_sample_direction(&sample))
+        });
+        assert!((found - mean).abs() < 5.0 * (error + own_error), "{count}: {found} instead of {mean}");
+        let deviation = own_error * f64::from(n as u32).sqrt() / found;
+        let other = 2.0 * error * f64::from(n as u32).sqrt() / mean;
+        assert!(deviation < 1.1 * other, "{count}: {deviation}, and {other} by the environment");
+        assert!(
+            before.is_none_or(|before| deviation < 1.5 * before.max(0.05)),
+            "{count}: {deviation} after {before:?}"
+        );
+        before = Some(deviation);
+    }
 }
