@@ -103,7 +103,7 @@ struct MeasuredCell {
 
 /// What is found below a divided cell.
 #[derive(Clone, Copy)]
-enum Child {
+enum FoundChild {
     /// A cell over which lookups are all the same.
     Constant(f32),
     /// A cell that may be divided, measured if it is fine.
@@ -154,13 +154,13 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
     }
 
     /// What a cell is found to be.
-    fn child(&self, cell: LatticeCell, is_fine: bool) -> Result<Child, S::Fault> {
+    fn child(&self, cell: LatticeCell, is_fine: bool) -> Result<FoundChild, S::Fault> {
         if !is_fine {
-            return Ok(self.source.constant(cell)?.map_or(Child::Open(None), Child::Constant));
+            return Ok(self.source.constant(cell)?.map_or(FoundChild::Open(None), FoundChild::Constant));
         }
         let (range, average) = self.source.measure(cell)?;
-        let open = || Child::Open(Some(self.judge(range, average)));
-        Ok(if range.is_constant() { Child::Constant(range.max) } else { open() })
+        let open = || FoundChild::Open(Some(self.judge(range, average)));
+        Ok(if range.is_constant() { FoundChild::Constant(range.max) } else { open() })
     }
 
     /// The cells that are to be divided, in their order; the others become leaves. Of fine cells those may stay that
@@ -220,8 +220,8 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
 
     /// Adds the nodes below cells. Returns those of their cells over which lookups differ.
     fn divide(&mut self, open: Vec<OpenCell>, is_fine: bool, share: f64) -> Result<Vec<OpenCell>, S::Fault> {
-        let children: Vec<[Child; ARITY]> = parallel::map(&open, WORTHWHILE_CELLS, |open| {
-            let mut children = [Child::Open(None); ARITY];
+        let children: Vec<[FoundChild; ARITY]> = parallel::map(&open, WORTHWHILE_CELLS, |open| {
+            let mut children = [FoundChild::Open(None); ARITY];
             for (slot, child) in children.iter_mut().enumerate() {
                 *child = self.child(open.cell.child(slot), is_fine)?;
             }
@@ -235,8 +235,8 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
                 self.averages.push(0.0);
                 self.divided.push(false);
                 match child {
-                    Child::Constant(value) => self.set(at, storable(f64::from(value)), share),
-                    Child::Open(measured) => next.push(OpenCell { cell: parent.cell.child(slot), at, measured }),
+                    FoundChild::Constant(value) => self.set(at, storable(f64::from(value)), share),
+                    FoundChild::Open(measured) => next.push(OpenCell { cell: parent.cell.child(slot), at, measured }),
                 }
             }
         }
