@@ -51,7 +51,7 @@ impl EnvironmentView<'_> {
 
     /// Returns a vector in the environment's frame.
     #[inline(always)]
-    pub(crate) fn to_local(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn local_vector(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         self.header.rotation.map(|axis| axis[0] * x + axis[1] * y + axis[2] * z)
     }
 

@@ -102,7 +102,6 @@ impl<'a> CellKernel<'a> {
 
     /// Weights of the children of a cell.
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "a loop over many arrays of one length, which becomes vectors")]
     fn weigh<const LOOKUP: bool, const COVERING: bool>(
         &self,
         at: LatticeCell,

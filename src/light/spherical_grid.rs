@@ -314,10 +314,8 @@ impl<'a> SphericalGrid<'a> {
             }
             keep_positive(&mut step.weights);
             let mut sums = [0.0; SIDE];
-            for j in 0..SIDE {
-                for i in 0..SIDE {
-                    sums[i] += step.weights[j * SIDE + i];
-                }
+            for row in step.weights.chunks_exact(SIDE) {
+                sums.iter_mut().zip(row).for_each(|(sum, weight)| *sum += weight);
             }
             let column_bits = if is_shared { SIDE_BITS - 1 } else { SIDE_BITS };
             let ([column, row], chosen) = guide.choose(&cell, column_bits, &sums, &step.weights)?;
@@ -388,9 +386,9 @@ impl<'a> SphericalGrid<'a> {
             cosines[i] = normal.x * toward[0][i] + normal.y * toward[1][i] + normal.z * toward[2][i];
             if let Some(environment) = environment.filter(|_| HAS_ENVIRONMENT) {
                 [local_poles[0][i], local_poles[1][i], local_poles[2][i]] =
-                    environment.to_local([poles[0][i], poles[1][i], poles[2][i]]);
+                    environment.local_vector([poles[0][i], poles[1][i], poles[2][i]]);
                 [local[0][i], local[1][i], local[2][i]] =
-                    environment.to_local([toward[0][i], toward[1][i], toward[2][i]]);
+                    environment.local_vector([toward[0][i], toward[1][i], toward[2][i]]);
             }
         }
         for j in 0..SIDE {
@@ -430,8 +428,8 @@ impl<'a> SphericalGrid<'a> {
                 turns[i] = at_least(turns[i], distance(&edges.toward, &step.arcs.toward, i));
             }
         }
-        for i in 0..SIDE {
-            chords[i] = math::sqrt(2.0 * step.arcs.versines[i]);
+        for (chord, versine) in chords.iter_mut().zip(&step.arcs.versines) {
+            *chord = math::sqrt(2.0 * versine);
         }
         let finest = environment.size() as f32;
         let ([_, v], [_, height]) = (cell.corner(), cell.size());

@@ -75,7 +75,7 @@ fn any_point_and_any_direction_are_safe() {
             }
             for corner in [triangle.a, triangle.b, triangle.c] {
                 let [u, v] = triangle.invert(corner);
-                assert!(!(u < -1e-3 || u > 1.001 || v < -1e-3 || v > 1.001), "{triangle:?} {corner} {u} {v}");
+                assert!((-1e-3..=1.001).contains(&u) && (-1e-3..=1.001).contains(&v), "{triangle:?} {corner} {u} {v}");
             }
         }
     }
