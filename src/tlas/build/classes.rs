@@ -11,7 +11,8 @@ use super::cluster::Item;
 use crate::tlas::arity::Arity;
 
 /// Ratio of the largest diagonal to the smallest in a class. A larger one mixes lights of more sizes, a smaller one
-/// sets lights apart that would do well in one tree. *Measured*: docs/ACCURACY.md, "Lights of different size".
+/// sets lights apart that would do well in one tree. Chosen, not swept; its effect is in docs/ACCURACY.md, "Choosing a
+/// triangle".
 const CLASS_RATIO: f32 = 8.0;
 /// Largest number of classes. Lights below the smallest class belong to it. More classes leave fewer lanes of the root for
 /// each. Chosen: four classes span three orders of magnitude, and the last one all below.

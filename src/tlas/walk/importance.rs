@@ -4,6 +4,9 @@
 //! The moments replace the conservative geometric term of Conty Estevez and Kulla (2018), which is kept as the proof.
 //! A cluster's position and normal are taken for normal variables with its mean and variance; cosines become the
 //! expectation of a clamped normal variable.
+//!
+//! Moments say little of a cluster around the shading point, or of one in doubt: such a child is opened, which means that
+//! the sum of its own children's weights is its weight.
 
 use glam::Vec3;
 
@@ -52,11 +55,11 @@ impl<O: LeafOracle> LeafOracle for &O {
 /// of normals, at most √3 / 2 of 1 / 510. A larger one only asks more often.
 const EDGE_COSINE: f32 = 3e-3;
 /// Radius of a child's ball, relative to the distance of its center, from which on the child is opened. A smaller one opens
-/// more and costs more, a larger one trusts the moments of clusters around the point. *Measured*: docs/ACCURACY.md,
-/// "Opening what is near".
+/// more and costs more, a larger one trusts the moments of clusters around the point. Chosen, not swept: with 1, the ball
+/// holds the point; its effect is in docs/ACCURACY.md, "Choosing a triangle".
 const OPENING: f32 = 1.0;
-/// Share of the largest weight below which a child is not opened for doubt alone. A smaller one opens more for fewer samples
-/// that find nothing. *Measured*: docs/ACCURACY.md, "Opening what is near".
+/// Share of the largest weight below which a child is not opened for doubt alone. A smaller one opens more, so that fewer
+/// samples find nothing, and costs more. Chosen, not swept; its effect is in docs/ACCURACY.md, "Choosing a triangle".
 const LEAST_DOUBTED_SHARE: f32 = 1.0 / 16.0;
 /// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
 const LEAST_DISTANCE2: f32 = 1e-30;
