@@ -95,7 +95,7 @@ fn shading_point(i: usize, pcg: &mut Pcg32) -> ShadingPoint {
 
 /// Probability of ending below a node where every weight is zero.
 fn dead_mass<const N: usize>(tlas: &WideTree<'_, N>, node: usize, oracle: &impl LeafOracle) -> f64 {
-    let weights = tlas.nodes[node].weigh(oracle);
+    let weights = tlas.weigh(node, oracle);
     if weights == [0.0; N] {
         return 1.0;
     }

@@ -27,5 +27,6 @@ mod normalisation;
 mod procedural;
 mod properties;
 mod refit;
+mod selection;
 mod stress;
 mod suns;

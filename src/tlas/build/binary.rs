@@ -12,6 +12,9 @@ use crate::progress::Progress;
 /// for unevenness.
 const MAX_SAOH_DEPTH: u32 = 48;
 
+/// Cost of a cluster of lights of different classes, which no lane may stand for. *Format*: no sum of costs is below it.
+pub(super) const JOINED: f32 = f32::INFINITY;
+
 /// Node of the binary tree. The left child follows its parent, which is why a subtree of `n` leaves takes exactly
 /// `2 n - 1` places and both halves can be built at once.
 #[derive(Clone, Copy, Debug, Default)]
@@ -21,6 +24,21 @@ pub(super) struct BinaryNode {
     pub(super) count: u32,
     /// The number of the light in a leaf, the distance to the right child elsewhere.
     pub(super) link: u32,
+}
+
+/// Builds a subtree for each class of sizes into `nodes`, and joins them: the first class on the left of each join, all
+/// others on the right. `classes` are the numbers of items of each class, in the order of `items`.
+pub(super) fn join(items: &mut [Item], nodes: &mut [BinaryNode], classes: &[usize], progress: &Progress<'_>) {
+    let [first, others @ ..] = classes else { return };
+    if others.is_empty() {
+        return subdivide(items, nodes, 0, progress);
+    }
+    let (root, below) = nodes.split_at_mut(1);
+    root[0] = BinaryNode { cost: JOINED, count: items.len() as u32, link: 2 * *first as u32 };
+    let (left_items, right_items) = items.split_at_mut(*first);
+    let (left, right) = below.split_at_mut(2 * first - 1);
+    subdivide(left_items, left, 0, progress);
+    join(right_items, right, others, progress);
 }
 
 /// Builds the subtree over `items` into `nodes`, which holds exactly its `2 n - 1` places.
@@ -69,7 +87,7 @@ fn split(items: &mut [Item], extent: &Extent, depth: u32) -> usize {
 }
 
 /// Moves the items that belong to the left to the front, and counts them.
-fn partition(items: &mut [Item], is_left: impl Fn(&Item) -> bool) -> usize {
+pub(super) fn partition(items: &mut [Item], is_left: impl Fn(&Item) -> bool) -> usize {
     let (mut from, mut to) = (0, items.len());
     loop {
         while from < to && is_left(&items[from]) {

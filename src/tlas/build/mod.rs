@@ -1,8 +1,10 @@
-//! How the tree is made: first a binary tree that arranges the lights ([`binary`]), then the wide tree whose nodes are
+//! How the tree is made: first lights of different size are set apart ([`classes`]), then a binary tree arranges those of
+//! each class ([`binary`]), then comes the wide tree whose nodes are
 //! cuts through it ([`collapse`]), and last what its nodes say of their children ([`fit`]).
 
 mod binary;
 mod bins;
+mod classes;
 mod cluster;
 mod collapse;
 mod encode;
@@ -12,7 +14,8 @@ mod forest;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use binary::{BinaryNode, subdivide};
+use binary::{BinaryNode, join};
+use classes::divide;
 use cluster::Item;
 use collapse::collapse;
 
@@ -35,7 +38,8 @@ pub(crate) fn build(
     }
     let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
     let mut binary = vec![BinaryNode::default(); 2 * count - 1];
-    subdivide(&mut items, &mut binary, 0, progress);
+    let classes = divide(&mut items, arity);
+    join(&mut items, &mut binary, &classes, progress);
     progress.check()?;
     drop(items);
     Ok(match arity {

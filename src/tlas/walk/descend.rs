@@ -41,7 +41,8 @@ impl<S: LeafOracle> Descent<S> {
     #[inline(always)]
     fn step<const N: usize>(&mut self, tlas: &WideTree<'_, N>) {
         let node = &tlas.nodes[self.node as usize];
-        self.choose(node, &node.weights(&self.receiver, &self.oracle));
+        let weights = tlas.weights(self.node as usize, &self.receiver, &self.oracle);
+        self.choose(node, &weights);
     }
 
     /// Chooses a child by the weights of all.
@@ -116,7 +117,7 @@ impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
             let mut going = true;
             while going {
                 for (walk, weights) in walks.iter().zip(&mut weights).filter(|(walk, _)| walk.end.is_none()) {
-                    *weights = self.tlas.nodes[walk.node as usize].weights(&walk.receiver, &walk.oracle);
+                    *weights = self.tlas.weights(walk.node as usize, &walk.receiver, &walk.oracle);
                 }
                 going = false;
                 for (walk, weights) in walks.iter_mut().zip(&weights).filter(|(walk, _)| walk.end.is_none()) {
@@ -151,7 +152,7 @@ impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
         for (node, lane) in self.tlas.path(self.leaf) {
             pmf *= match self.first {
                 Some(weights) if node == 0 => pmf_wide(&weights.lanes::<N>(), lane),
-                _ => pmf_wide(&self.tlas.nodes[node].weights(&receiver, self.oracle), lane),
+                _ => pmf_wide(&self.tlas.weights(node, &receiver, self.oracle), lane),
             };
         }
         pmf
@@ -160,7 +161,8 @@ impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
 
 /// The weights of one node.
 struct NodeWeights<'a, const N: usize, S> {
-    node: &'a Node<N>,
+    tlas: &'a WideTree<'a, N>,
+    node: usize,
     oracle: &'a S,
 }
 
@@ -169,18 +171,16 @@ impl<const N: usize, S: LeafOracle> Kernel for NodeWeights<'_, N, S> {
 
     #[inline(always)]
     fn run(self) -> [f32; N] {
-        self.node.weights(&self.oracle.shading_point().lanes(), self.oracle)
-    }
-}
-
-impl<const N: usize> Node<N> {
-    /// Returns the weight of every child.
-    pub(in crate::tlas) fn weigh(&self, oracle: &impl LeafOracle) -> [f32; N] {
-        InstructionSet::best().run(NodeWeights { node: self, oracle })
+        self.tlas.weights(self.node, &self.oracle.shading_point().lanes(), self.oracle)
     }
 }
 
 impl<const N: usize> WideTree<'_, N> {
+    /// Returns the weight of every child of a node.
+    pub(in crate::tlas) fn weigh(&self, node: usize, oracle: &impl LeafOracle) -> [f32; N] {
+        InstructionSet::best().run(NodeWeights { tlas: self, node, oracle })
+    }
+
     /// Draws a leaf. Returns it with its probability; `None` where nothing can arrive from the part of the tree
     /// that `u` leads to. `first` are [`Self::first_weights`], if they are known.
     pub(crate) fn sample(
@@ -230,7 +230,7 @@ impl<const N: usize> WideTree<'_, N> {
     /// Returns the weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
     /// energies; `None` for a tree without nodes.
     pub(crate) fn first_weights(&self, oracle: &impl LeafOracle) -> Option<FirstWeights> {
-        self.nodes.first().map(|root| FirstWeights::new(root.weigh(oracle)))
+        (!self.nodes.is_empty()).then(|| FirstWeights::new(self.weigh(0, oracle)))
     }
 
     /// Whether the tree is a single leaf, and that leaf visible.

@@ -4,12 +4,16 @@
 //! The moments replace the conservative geometric term of Conty Estevez and Kulla (2018), which is kept as the proof.
 //! A cluster's position and normal are taken for normal variables with its mean and variance; cosines become the
 //! expectation of a clamped normal variable.
+//!
+//! Moments say little of a cluster around the shading point, or of one in doubt: such a child is opened, which means that
+//! the sum of its own children's weights is its weight.
 
 use glam::Vec3;
 
 use crate::math::{self, at_least, only_if};
 use crate::receiver::{LEAST_CLUSTER_COSINE, ReceiverLanes, ShadingPoint};
 use crate::tlas::node::{ALL, Child, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
+use crate::tlas::tree::WideTree;
 use crate::warp::{keep_least, within_range};
 
 /// What the tree asks of the level above about its leaves and about what they show.
@@ -50,6 +54,13 @@ impl<O: LeafOracle> LeafOracle for &O {
 /// Cosine at the lights up to which a single triangle is asked for whether it is visible. *Proved*: covers the rounding
 /// of normals, at most √3 / 2 of 1 / 510. A larger one only asks more often.
 const EDGE_COSINE: f32 = 3e-3;
+/// Radius of a child's ball, relative to the distance of its center, from which on the child is opened. A smaller one opens
+/// more and costs more, a larger one trusts the moments of clusters around the point. Chosen, not swept: with 1, the ball
+/// holds the point; its effect is in docs/ACCURACY.md, "Choosing a triangle".
+const OPENING: f32 = 1.0;
+/// Share of the largest weight below which a child is not opened for doubt alone. A smaller one opens more, so that fewer
+/// samples find nothing, and costs more. Chosen, not swept; its effect is in docs/ACCURACY.md, "Choosing a triangle".
+const LEAST_DOUBTED_SHARE: f32 = 1.0 / 16.0;
 /// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
 const LEAST_DISTANCE2: f32 = 1e-30;
 
@@ -72,21 +83,70 @@ struct Estimates<const N: usize> {
     largest: u32,
     /// A set of bits: leaves of which the bounds do not decide whether they are visible.
     doubtful: u32,
+    /// Two sets of bits: children near the shading point, and those of which bounds and moments do not agree whether they
+    /// are visible.
+    opened: [u32; 2],
 }
 
-impl<const N: usize> Node<N> {
-    /// Returns the weight of every child. All zero where nothing below the node can be visible.
+impl<const N: usize> WideTree<'_, N> {
+    /// Returns the weight of every child of a node. All zero where nothing below the node can be visible.
+    ///
+    /// A child that is a node itself and whose moments say little from here is opened: the sum of its own children's
+    /// weights is its weight. That is one level, and depends on the shading point alone.
     #[inline(always)]
-    pub(super) fn weights(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
-        let Estimates { mut weights, mut largest, doubtful } = self.estimates(x);
-        if doubtful != 0 {
-            largest = self.ask(oracle, &mut weights, doubtful);
-        }
-        if { self.portals } != [0; N] {
-            largest = self.look_through(x, oracle, &mut weights);
+    pub(super) fn weights(&self, index: usize, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
+        let node = &self.nodes[index];
+        let Estimates { mut weights, mut largest, opened, .. } = node.asked(x, oracle);
+        let mut waiting = node.to_be_opened(opened, &weights, largest);
+        if waiting != 0 {
+            while waiting != 0 {
+                let lane = waiting.trailing_zeros();
+                waiting &= waiting - 1;
+                let child = node.first_node.wrapping_add(lane);
+                weights[lane as usize] = self.opened(child as usize, x, oracle);
+            }
+            largest = weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()));
         }
         keep_least(&mut weights, largest);
         weights
+    }
+
+    /// Returns the sum of the weights of a node's children.
+    #[inline(always)]
+    fn opened(&self, index: usize, x: &ReceiverLanes, oracle: &impl LeafOracle) -> f32 {
+        let sum: f32 = self.nodes[index].asked(x, oracle).weights.iter().sum();
+        only_if(sum > 0.0, within_range(sum))
+    }
+}
+
+impl<const N: usize> Node<N> {
+    /// Estimates all lanes, and asks the oracle about what is in doubt and what portals show.
+    #[inline(always)]
+    fn asked(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> Estimates<N> {
+        let mut estimates = self.estimates(x);
+        if estimates.doubtful != 0 {
+            estimates.largest = self.ask(oracle, &mut estimates.weights, estimates.doubtful);
+        }
+        if { self.portals } != [0; N] {
+            estimates.largest = self.look_through(x, oracle, &mut estimates.weights);
+        }
+        estimates
+    }
+
+    /// Returns the children to be opened of those in question, as a set of bits.
+    #[inline(always)]
+    fn to_be_opened(&self, [near, uncertain]: [u32; 2], weights: &[f32; N], largest: u32) -> u32 {
+        let inner = !(u32::MAX << self.node_count);
+        if (near | uncertain) & inner == 0 {
+            return 0;
+        }
+        let least = LEAST_DOUBTED_SHARE * f32::from_bits(largest);
+        let (mut heavy, mut possible) = (0, 0);
+        for i in 0..N {
+            heavy |= u32::from(weights[i] >= least) << i;
+            possible |= u32::from(weights[i] > 0.0) << i;
+        }
+        (near | uncertain & heavy) & possible & inner
     }
 
     /// Asks the oracle about leaves in doubt, and returns the bits of the largest weight.
@@ -143,7 +203,7 @@ impl<const N: usize> Node<N> {
         let mean_step = half_step * (1.0 / MEAN_STEPS);
         let (horizon, absolute_horizon, normal) = (x.horizon, x.horizon.abs(), x.normal);
         let mut weights = [0.0; N];
-        let (mut largest, mut doubtful) = (0, 0);
+        let (mut largest, mut doubtful, mut near, mut uncertain) = (0, 0, 0, 0);
         for i in 0..N {
             let counts = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
             let half = counts * half_step;
@@ -190,10 +250,13 @@ impl<const N: usize> Node<N> {
 
             weights[i] = only_if(!culled, within_range(energy * term));
             largest = largest.max(weights[i].to_bits());
-            doubtful |= u32::from((straddles | (facing < EDGE_COSINE * distance)) & !culled) << i;
+            let averted = facing < EDGE_COSINE * distance;
+            doubtful |= u32::from((straddles | averted) & !culled) << i;
+            near |= u32::from(radius2 > OPENING * OPENING * distance2) << i;
+            uncertain |= u32::from((straddles & (side < EDGE_COSINE * distance)) | averted) << i;
         }
         let leaves = self.children() & (u32::MAX << self.node_count);
-        Estimates { weights, largest, doubtful: doubtful & leaves }
+        Estimates { weights, largest, doubtful: doubtful & leaves, opened: [near, uncertain] }
     }
 }
 

@@ -65,7 +65,7 @@ impl<const N: usize> WideTree<'_, N> {
         let mut weights = [0.0; N];
         loop {
             if arriving && depth < splitting.levels && self.is_split(node, x, &measure) {
-                weights = self.nodes[node].weigh(oracle);
+                weights = self.weigh(node, oracle);
             } else if arriving {
                 if let Some((leaf, count)) = self.sample_below(node, oracle, variate(draws)) {
                     visit(leaf, count);
@@ -77,7 +77,7 @@ impl<const N: usize> WideTree<'_, N> {
             if lane == N {
                 let Some((parent, from)) = self.parent(node) else { return };
                 (node, lane, depth) = (parent, from + 1, depth - 1);
-                weights = self.nodes[node].weigh(oracle);
+                weights = self.weigh(node, oracle);
                 continue;
             }
             match self.nodes[node].child(lane) {
@@ -104,7 +104,7 @@ impl<const N: usize> WideTree<'_, N> {
         // A node splits only below split nodes: `count` assumes that all above do, `pmf` that none does.
         let (mut count, mut pmf) = (1.0, 1.0);
         for (i, (node, lane)) in (0..).zip(self.path(leaf)) {
-            let share = warp::pmf_wide(&self.nodes[node].weigh(oracle), lane);
+            let share = warp::pmf_wide(&self.weigh(node, oracle), lane);
             pmf *= share;
             let depth = height - 1 - i;
             if !(depth < splitting.levels && self.is_split(node, x, &measure)) {

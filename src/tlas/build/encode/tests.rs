@@ -75,7 +75,7 @@ fn is_dark(bounds: &LightBounds, x: &ShadingPoint) -> bool {
 
 /// Checks all leaves below a node. Returns how many lanes were culled.
 fn check(tlas: &WideTree<'_, 8>, node: usize, culled: bool, x: &ShadingPoint, dark: &dyn Fn(u32) -> bool) -> usize {
-    let weights = tlas.nodes[node].weigh(&open(x));
+    let weights = tlas.weigh(node, &open(x));
     let mut count = 0;
     for (lane, &weight) in weights.iter().enumerate() {
         let culled = culled || weight == 0.0;

@@ -1,0 +1,85 @@
+//! Lights of different size apart.
+//!
+//! A cluster that holds a large light and small ones has the extent of the large one: from any point near it, its moments
+//! say little of either, and a lamp under a glowing dome starves. So lights are sorted into classes by the diagonals of
+//! their boxes, each class gets a tree of its own, and the root joins these.
+
+use smallvec::SmallVec;
+
+use super::binary::partition;
+use super::cluster::Item;
+use crate::tlas::arity::Arity;
+
+/// Ratio of the largest diagonal to the smallest in a class. A larger one mixes lights of more sizes, a smaller one
+/// sets lights apart that would do well in one tree. Chosen, not swept; its effect is in docs/ACCURACY.md, "Choosing a
+/// triangle".
+const CLASS_RATIO: f32 = 8.0;
+/// Largest number of classes. Lights below the smallest class belong to it. More classes leave fewer lanes of the root for
+/// each. Chosen: four classes span three orders of magnitude, and the last one all below.
+pub(super) const MOST_CLASSES: usize = 4;
+
+/// Sorts lights into classes, the largest lights first. Returns the number of lights in each class.
+pub(super) fn divide(items: &mut [Item], arity: Arity) -> SmallVec<[usize; MOST_CLASSES]> {
+    let diagonal2 = |item: &Item| (item.high - item.low).length_squared();
+    // At least two lanes for a class.
+    let most = MOST_CLASSES.min(arity.lanes() / 2);
+    let mut classes = SmallVec::new();
+    let mut rest = items;
+    while classes.len() + 1 < most {
+        let largest2 = rest.iter().map(diagonal2).fold(0.0, f32::max);
+        let least2 = largest2 * (1.0 / (CLASS_RATIO * CLASS_RATIO));
+        if rest.iter().all(|item| diagonal2(item) >= least2) {
+            break;
+        }
+        let count = partition(rest, |item| diagonal2(item) >= least2);
+        classes.push(count);
+        rest = &mut rest[count..];
+    }
+    classes.push(rest.len());
+    classes
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::bounds::LightBounds;
+    use crate::geometry::{Aabb, Cone};
+    use glam::Vec3;
+
+    fn items(diagonals: &[f32]) -> Vec<Item> {
+        let item = |(i, &diagonal): (usize, &f32)| {
+            let aabb = Aabb { min: Vec3::splat(i as f32), max: Vec3::new(i as f32 + diagonal, i as f32, i as f32) };
+            let normals = Cone::single(Vec3::Z);
+            Item::new(&LightBounds { aabb, normals, flux: 1.0, portal: 0.0, two_sided: false }, i as u32)
+        };
+        diagonals.iter().enumerate().map(item).collect()
+    }
+
+    fn classes(diagonals: &[f32], arity: Arity) -> (Vec<usize>, Vec<u32>) {
+        let mut items = items(diagonals);
+        let classes = divide(&mut items, arity).to_vec();
+        (classes, items.iter().map(|item| item.light).collect())
+    }
+
+    #[test]
+    fn lights_of_one_class_stay_in_their_order() {
+        assert_eq!(classes(&[1.0, 0.5, 4.0, 2.0], Arity::Sixteen), (Vec::from([4]), Vec::from([0, 1, 2, 3])));
+        assert_eq!(classes(&[0.0, 0.0], Arity::Sixteen).0, [2]);
+    }
+
+    #[test]
+    fn classes_are_counted_from_their_largest_light() {
+        let (counts, lights) = classes(&[0.01, 10.0, 1.0, 0.02, 2.0], Arity::Sixteen);
+        assert_eq!(counts, [2, 1, 2]);
+        assert!(lights[..2].iter().all(|light| [1, 4].contains(light)) && lights[2] == 2, "{lights:?}");
+    }
+
+    #[test]
+    fn the_smallest_class_holds_all_below() {
+        let sizes: Vec<f32> = (0..10).map(|i| 0.1f32.powi(i)).collect();
+        assert_eq!(classes(&sizes, Arity::Sixteen).0, [1, 1, 1, 7]);
+        assert_eq!(classes(&sizes, Arity::Four).0, [1, 9]);
+    }
+}
