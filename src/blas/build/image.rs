@@ -173,6 +173,7 @@ pub(crate) fn build_images(
         while !rest.is_empty() {
             let batch = images.batch(rest);
             images.build(&rest[..batch], pool, progress, &mut roots)?;
+            images.end_batch();
             rest = &rest[batch..];
         }
     }
@@ -191,6 +192,14 @@ struct ImageGroup<'a> {
 }
 
 impl<'a> ImageGroup<'a> {
+    /// Leaves what the trees of a batch have saved to the next ones. Within a batch memory only shrinks, so that most trees
+    /// need not be grown again.
+    fn end_batch(&mut self) {
+        for ImageMemory { saved, saved_now, .. } in self.pyramids.iter_mut().map(|pyramid| &mut pyramid.memory) {
+            *saved += core::mem::take(saved_now);
+        }
+    }
+
     fn slot(&self, tree: &ImageTree<'_>) -> usize {
         // Every tree's texture is in its group.
         self.numbers.partition_point(|&number| number < tree.texture).min(self.pyramids.len() - 1)
@@ -243,7 +252,8 @@ impl<'a> ImageGroup<'a> {
             let (root, bytes) = grown[at].tree.store(pool)?;
             let (left, grown_for) = (&mut self.pyramids[slot].memory, &grown[at].memory);
             left.extra -= (bytes - grown_for.own).max(0.0).min(left.extra);
-            left.saved = (left.saved + grown_for.usual - bytes).max(0.0);
+            left.saved = (left.saved - (bytes - grown_for.usual).max(0.0)).max(0.0);
+            left.saved_now += (grown_for.usual - bytes).max(0.0);
             roots.push(root);
             // It is packed now.
             grown[at].tree = GrownTree::constant(root.average);
@@ -291,7 +301,8 @@ impl GrownImage {
     fn fits(&self, pyramid: &TexturePyramid<'_>) -> bool {
         let texture = pyramid.texture();
         let memory = TreeBudget::new(&self.uv_triangle, texture, pyramid.memory);
-        self.tree.nodes() <= memory.nodes(&self.uv_triangle, texture) + memory.worthwhile_nodes()
+        let [before, now] = [&self.memory, &memory].map(|memory| memory.nodes(&self.uv_triangle, texture));
+        now >= self.tree.nodes().min(before)
     }
 }
 
@@ -305,6 +316,7 @@ pub(crate) fn build(pyramid: &mut TexturePyramid<'_>, uv: [Vec2; 3], pool: &mut 
     let mut roots = Vec::new();
     let image = *pyramid.texture();
     images.build(&[ImageTree { image, texture: 0, uv }], pool, &Progress::new(None, 1.0), &mut roots)?;
+    images.end_batch();
     pyramid.memory = images.pyramids[0].memory;
     Ok(roots[0])
 }

@@ -35,8 +35,10 @@ pub(crate) struct TexturePyramid<'a> {
 pub(super) struct ImageMemory {
     /// Bytes beyond two a texel.
     pub(super) extra: f64,
-    /// Bytes that triangles so far have left of what they could have taken: later ones may have them.
+    /// Bytes that triangles before have left of what they could have taken: later ones may have them.
     pub(super) saved: f64,
+    /// Bytes that triangles of this batch have left, for the next batch.
+    pub(super) saved_now: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -48,7 +50,7 @@ struct PyramidLevel {
 impl<'a> TexturePyramid<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
-        let memory = ImageMemory { extra: BYTES_PER_IMAGE, saved: 0.0 };
+        let memory = ImageMemory { extra: BYTES_PER_IMAGE, ..ImageMemory::default() };
         let mut pyramid = Self { texture, levels: Vec::new(), memory };
         let mut size = texture.size();
         while size != [1, 1] {

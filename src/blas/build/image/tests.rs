@@ -251,10 +251,17 @@ fn order_decides_who_gets_what_is_left() {
         (0..300).map(|_| ImageTree { image, texture: 3, uv: random_uv(&mut rng, 0.7) }).collect();
     let mut together = Vec::new();
     let roots = build_images(&trees, &mut together, &Progress::new(None, 1.0)).unwrap();
-    let (mut pyramid, mut alone) = (TexturePyramid::new(image), Vec::new());
-    for (tree, root) in trees.iter().zip(&roots) {
-        assert_eq!(build(&mut pyramid, tree.uv, &mut alone).unwrap(), *root);
+    let mut images = ImageGroup { numbers: alloc::vec![3], pyramids: alloc::vec![TexturePyramid::new(image)] };
+    let (mut alone, mut expected, mut rest) = (Vec::new(), Vec::new(), &trees[..]);
+    while !rest.is_empty() {
+        let (batch, others) = rest.split_at(images.batch(rest));
+        for tree in batch {
+            images.build(core::slice::from_ref(tree), &mut alone, &Progress::new(None, 1.0), &mut expected).unwrap();
+        }
+        images.end_batch();
+        rest = others;
     }
-    assert_eq!(pyramid.memory.extra, 0.0);
+    assert_eq!(roots, expected);
+    assert_eq!(images.pyramids[0].memory.extra, 0.0);
     assert!(together == alone);
 }
