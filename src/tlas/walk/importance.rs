@@ -253,7 +253,7 @@ impl<const N: usize> Node<N> {
             let averted = facing < EDGE_COSINE * distance;
             doubtful |= u32::from((straddles | averted) & !culled) << i;
             near |= u32::from(radius2 > OPENING * OPENING * distance2) << i;
-            uncertain |= u32::from((straddles & (side < EDGE_COSINE * distance)) | averted) << i;
+            uncertain |= u32::from(straddles & averted & (side < EDGE_COSINE * distance)) << i;
         }
         let leaves = self.children() & (u32::MAX << self.node_count);
         Estimates { weights, largest, doubtful: doubtful & leaves, opened: [near, uncertain] }
