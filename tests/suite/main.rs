@@ -23,6 +23,7 @@ mod invariance;
 mod irradiance;
 mod layering;
 mod memory;
+mod near;
 mod normalisation;
 mod procedural;
 mod properties;

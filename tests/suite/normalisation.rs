@@ -156,7 +156,7 @@ fn the_density_integrates_to_one_at_any_scale() {
         assert!(deviation < tolerance, "{}: {}, missed {}", found.name, found.integral, found.missed);
     }
     // A point next to a sliver sees densities that vary over less than the integration resolves.
-    let resolved = found.iter().filter(|found| found.unresolved < 0.1 * TOLERANCE).count();
+    let resolved = found.iter().filter(|found| found.unresolved < TOLERANCE).count();
     println!("{resolved} of {count} scenes are resolved");
     assert!(10 * resolved >= 9 * count, "only {resolved} of {count} scenes are resolved");
 }

@@ -97,7 +97,7 @@ impl<const N: usize> WideTree<'_, N> {
     pub(super) fn weights(&self, index: usize, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
         let node = &self.nodes[index];
         let Estimates { mut weights, mut largest, opened, .. } = node.asked(x, oracle);
-        let mut waiting = node.to_be_opened(opened, &weights, largest);
+        let mut waiting = node.worth_opening(opened, &weights, largest);
         if waiting != 0 {
             while waiting != 0 {
                 let lane = waiting.trailing_zeros();
@@ -135,16 +135,16 @@ impl<const N: usize> Node<N> {
 
     /// Returns the children to be opened of those in question, as a set of bits.
     #[inline(always)]
-    fn to_be_opened(&self, [near, uncertain]: [u32; 2], weights: &[f32; N], largest: u32) -> u32 {
+    fn worth_opening(&self, [near, uncertain]: [u32; 2], weights: &[f32; N], largest: u32) -> u32 {
         let inner = !(u32::MAX << self.node_count);
         if (near | uncertain) & inner == 0 {
             return 0;
         }
         let least = LEAST_DOUBTED_SHARE * f32::from_bits(largest);
         let (mut heavy, mut possible) = (0, 0);
-        for i in 0..N {
-            heavy |= u32::from(weights[i] >= least) << i;
-            possible |= u32::from(weights[i] > 0.0) << i;
+        for (i, &weight) in weights.iter().enumerate() {
+            heavy |= u32::from(weight >= least) << i;
+            possible |= u32::from(weight > 0.0) << i;
         }
         (near | uncertain & heavy) & possible & inner
     }

@@ -1,5 +1,6 @@
 //! Integrals of a density over triangles, from the outside: nothing is known but values of `pdf` at points, and that
-//! the density per area is constant over dyadic barycentric cells of a depth that is not known.
+//! either the density per area is constant over dyadic barycentric cells of a depth that is not known, or that per solid
+//! angle over cells of any shape.
 
 use fanlight::{Hit, LightSample, MeshId, ShadingPoint, TriangleId};
 use glam::DVec3;
@@ -9,6 +10,9 @@ use super::scene::Scene;
 /// Cells are not divided further, unless a test asks for it. What is left is the difference between neighbours over
 /// 4^-13 of a triangle.
 const DEEPEST: u32 = 13;
+
+/// Cells whose integral is less in doubt are not divided either: edges of cells by solid angle, which cross all others.
+const NEGLIGIBLE_DOUBT: f64 = 5e-7;
 
 /// Barycentric coordinates that every density is exact for are multiples of this.
 const STEP: f64 = 1.0 / (1 << 24) as f64;
@@ -23,6 +27,22 @@ const DEEPEST_DOUBT: u32 = 8;
 mod walk;
 
 use walk::{Cell, Open, Walk};
+
+/// A density at a point.
+#[derive(Clone, Copy, Debug, Default)]
+struct Density {
+    /// Per solid angle.
+    pdf: f64,
+    /// From solid angle to the unit of the triangle.
+    scale: f64,
+}
+
+impl Density {
+    /// In units of one over the triangle's area.
+    fn by_area(self) -> f64 {
+        self.pdf * self.scale
+    }
+}
 
 /// One triangle from one shading point.
 pub(crate) struct OnTriangle<'a> {
@@ -53,24 +73,32 @@ impl<'a> OnTriangle<'a> {
         Self { deepest, most, enough, ..self }
     }
 
-    /// Density in units of one over the triangle's area.
-    fn density(&self, b: [f64; 2]) -> f64 {
+    /// The density at a point.
+    fn density(&self, b: [f64; 2]) -> Density {
         // Next to the shading point, rounding would be felt.
         let barycentrics = b.map(|b| ((b / STEP).round() * STEP) as f32);
-        let pdf = (self.pdf)(&Hit::new(self.id, barycentrics));
-        if pdf == 0.0 {
-            return 0.0;
-        }
         let [b1, b2] = barycentrics.map(f64::from);
         let [v0, v1, v2] = self.vertices;
         let distance = (v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2).length();
-        pdf * self.height_area / distance.powi(3)
+        let scale = self.height_area / distance.powi(3);
+        let pdf = (self.pdf)(&Hit::new(self.id, barycentrics));
+        if distance > 0.0 { Density { pdf, scale } } else { Density::default() }
+    }
+
+    /// Solid angle of a barycentric triangle with this share of the area.
+    fn solid_angle(&self, corners: [[f64; 2]; 3], share: f64) -> f64 {
+        let [v0, v1, v2] = self.vertices;
+        let [a, b, c] = corners.map(|[b1, b2]| (v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2).normalize_or_zero());
+        let lengths = corners.map(|[b1, b2]| (v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2).length());
+        let triple = 2.0 * self.height_area * share / lengths.iter().product::<f64>();
+        let angle = 2.0 * triple.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+        if angle.is_finite() { angle } else { 0.0 }
     }
 
     /// Integrals over the cells of a depth, in the order of [`bin`]. Cells are divided as long as the density differs
     /// inside of them: between the middles of their quarters, of the quarters of these, or at one of the `probes`;
-    /// those that matter most come first. Probes only tell where to look closer; samples do well. Second, the most
-    /// that cells which were too small to divide can be wrong by.
+    /// those that matter most come first. Probes only tell where to look closer; samples do well. Second, what cells which
+    /// were too small to divide can be wrong by, five standard errors.
     pub(crate) fn integrate(&self, bin_depth: u32, least_depth: u32, probes: &[[f32; 2]]) -> (Vec<f64>, f64) {
         let probes = probes.iter().map(|b| (b.map(f64::from), self.density(b.map(f64::from)))).collect();
         let mut walk = Walk::new(self, bin_depth, least_depth);
@@ -85,7 +113,7 @@ impl<'a> OnTriangle<'a> {
                 walk.settle(&cell, range, &values);
             }
         }
-        let unresolved = if self.is_limited() { walk.variance.sqrt() } else { walk.unresolved };
+        let unresolved = if self.is_limited() { walk.variance.sqrt() } else { 5.0 * walk.variance.sqrt() };
         (walk.bins, unresolved)
     }
 

@@ -5,7 +5,7 @@ extern crate alloc;
 use alloc::collections::BinaryHeap;
 use core::cmp::Ordering;
 
-use super::{DEEPEST_DOUBT, OnTriangle, middle, quarter, step, tip};
+use super::{DEEPEST_DOUBT, Density, NEGLIGIBLE_DOUBT, OnTriangle, middle, quarter, step, tip};
 use crate::common::pcg::Pcg32;
 
 /// A dyadic part of a triangle.
@@ -14,7 +14,7 @@ pub(super) struct Cell {
     pub(super) depth: u32,
     pub(super) bin: usize,
     /// In barycentrics of its own, and the density there.
-    pub(super) probes: Vec<([f64; 2], f64)>,
+    pub(super) probes: Vec<([f64; 2], Density)>,
 }
 
 impl Cell {
@@ -33,10 +33,35 @@ pub(super) struct Open {
     /// How wrong the integral over it can be.
     pub(super) key: f64,
     pub(super) cell: Cell,
-    /// Difference of the largest and the least density that was seen.
-    pub(super) range: f64,
+    pub(super) range: Range,
     /// In the middles of its quarters.
-    pub(super) values: [f64; 4],
+    pub(super) values: [Density; 4],
+}
+
+/// Differences of the largest and the least density that were seen in a cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Range {
+    by_area: f64,
+    by_angle: f64,
+    solid_angle: f64,
+}
+
+/// Difference of the largest and the least value, zero up to rounding.
+fn range(values: impl Iterator<Item = f64>) -> f64 {
+    let (low, high) = values.fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
+    if high - low > 1e-4 * high { high - low } else { 0.0 }
+}
+
+impl Range {
+    /// How wrong the integral over a cell can be.
+    fn doubt(&self, share: f64) -> f64 {
+        (share * self.by_area).min(self.solid_angle * self.by_angle)
+    }
+
+    /// Whether the density varies less per solid angle than per area.
+    fn is_by_angle(&self, share: f64) -> bool {
+        self.solid_angle * self.by_angle < share * self.by_area
+    }
 }
 
 impl Ord for Open {
@@ -65,7 +90,6 @@ pub(super) struct Walk<'a, 'b> {
     bin_depth: u32,
     least_depth: u32,
     pub(super) open: BinaryHeap<Open>,
-    pub(super) unresolved: f64,
     pub(super) variance: f64,
     /// Sum of the keys of all open cells.
     pub(super) doubt: f64,
@@ -81,14 +105,13 @@ impl<'a, 'b> Walk<'a, 'b> {
             least_depth: least_depth.max(bin_depth),
             open: BinaryHeap::new(),
             doubt: 0.0,
-            unresolved: 0.0,
             variance: 0.0,
             pcg: Pcg32::new(on.id.triangle.into(), 63),
         }
     }
 
     pub(super) fn divide(&mut self, cell: Cell) {
-        let mut parts: [Vec<([f64; 2], f64)>; 4] = Default::default();
+        let mut parts: [Vec<([f64; 2], Density)>; 4] = Default::default();
         let quarters = cell.quarters();
         for (b, value) in cell.probes {
             let (i, local) = step(b);
@@ -107,7 +130,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
         let quarters = cell.quarters();
         let values = quarters.map(|q| self.on.density(middle(q)));
-        let are_equal = values.iter().all(|v| (v - values[0]).abs() <= 1e-4 * v);
+        let are_equal = range(values.iter().map(|v| v.pdf)) == 0.0 || range(values.iter().map(|v| v.by_area())) == 0.0;
         // Averages are rounded, so that four can be the same by chance: then their quarters must be, too.
         let mut parts = Vec::new();
         if cell.depth < DEEPEST_DOUBT && are_equal {
@@ -119,46 +142,65 @@ impl<'a, 'b> Walk<'a, 'b> {
             parts.extend((0..3).map(|k| self.on.density(tip(cell.corners, k))));
         }
         let all = || values.iter().chain(&parts).copied().chain(cell.probes.iter().map(|p| p.1));
-        let (low, high) = all().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
-        let range = if high - low > 1e-4 * high { high - low } else { 0.0 };
-        if range == 0.0 || cell.depth >= self.on.deepest {
+        let share = cell.share();
+        let range = Range {
+            by_area: range(all().map(Density::by_area)),
+            by_angle: range(all().map(|v| v.pdf)),
+            solid_angle: self.on.solid_angle(cell.corners, share),
+        };
+        let key = range.doubt(share);
+        let is_small = !self.on.is_limited() && key < NEGLIGIBLE_DOUBT;
+        if key == 0.0 || is_small || cell.depth >= self.on.deepest {
             self.settle(&cell, range, &values);
         } else {
-            let key = cell.share() * range;
             self.doubt += key;
             self.open.push(Open { key, cell, range, values });
         }
     }
 
     /// Adds what is known of a cell.
-    pub(super) fn settle(&mut self, cell: &Cell, range: f64, values: &[f64; 4]) {
+    pub(super) fn settle(&mut self, cell: &Cell, range: Range, values: &[Density; 4]) {
         let share = cell.share();
-        self.unresolved += share * range;
-        let mean = if range > 0.0 && self.on.is_limited() {
+        let doubt = range.doubt(share);
+        self.bins[cell.bin] += if doubt > 0.0 {
             // Samples that fell where the random places may miss what they show.
             if !cell.probes.is_empty() {
-                self.variance += (0.25 * share * range).powi(2);
+                self.variance += (0.25 * doubt).powi(2);
             }
-            self.at_random(cell)
+            self.at_random(cell, range)
+        } else if range.is_by_angle(share) {
+            range.solid_angle * values.iter().map(|v| v.pdf).sum::<f64>() / 4.0
         } else {
-            values.iter().sum::<f64>() / 4.0
+            share * values.iter().map(|v| v.by_area()).sum::<f64>() / 4.0
         };
-        self.bins[cell.bin] += share * mean;
     }
 
-    /// Mean over random places, two in each quarter of a cell.
-    fn at_random(&mut self, cell: &Cell) -> f64 {
-        let mut sum = 0.0;
-        for [a, b, c] in cell.quarters() {
-            let [first, second] = [(); 2].map(|()| {
+    /// Integral by random places, two in each quarter of a cell.
+    fn at_random(&mut self, cell: &Cell, range: Range) -> f64 {
+        let share = cell.share();
+        let quarters = cell.quarters();
+        let values = quarters.map(|[a, b, c]| {
+            [(); 2].map(|()| {
                 let [u, v] = [self.pcg.f32(), self.pcg.f32()].map(f64::from);
                 let [s, t] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
                 self.on.density(core::array::from_fn(|i| a[i] + (b[i] - a[i]) * s + (c[i] - a[i]) * t))
-            });
-            sum += first + second;
+            })
+        });
+        let mean = |value: fn(Density) -> f64| values.as_flattened().iter().map(|v| value(*v)).sum::<f64>() / 8.0;
+        let (value, unit): (fn(Density) -> f64, f64) = if range.is_by_angle(share) {
+            // Weighed by the solid angle that each place stands for, whose sum is known.
+            (|v| v.pdf, range.solid_angle)
+        } else {
+            (Density::by_area, share)
+        };
+        for [first, second] in values {
             // Of the mean of the two, with the share of a quarter.
-            self.variance += (cell.share() * (first - second)).powi(2) / 64.0;
+            self.variance += (unit * (value(first) - value(second))).powi(2) / 64.0;
         }
-        sum / 8.0
+        if range.is_by_angle(share) {
+            unit * mean(Density::by_area) / mean(|v| v.scale).max(f64::MIN_POSITIVE)
+        } else {
+            unit * mean(Density::by_area)
+        }
     }
 }
