@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::progress::Cancelled;
+
 /// Why a builder refused its input, or a loader its bytes.
 ///
 /// The kinds are private, so that new ones can be added; the message names the mesh, the element, the value
@@ -11,7 +13,8 @@ pub struct Error(pub(crate) ErrorKind);
 
 impl Error {
     /// Whether it is no mistake but the host's own wish, given by what it passed to
-    /// [`build_with`](crate::LightSamplerBuilder::build_with).
+    /// [`build_with`](crate::LightSamplerBuilder::build_with) or
+    /// [`Environment::new_with`](crate::Environment::new_with).
     pub fn is_cancelled(&self) -> bool {
         self.0 == ErrorKind::Cancelled
     }
@@ -30,6 +33,12 @@ impl Error {
     /// `Ok` if a count that bytes hold is the expected one.
     pub(crate) fn unless_equal(what: &'static str, found: usize, expected: usize) -> Result<(), Self> {
         if found == expected { Ok(()) } else { Err(Self::bytes(what, 0, found, expected)) }
+    }
+}
+
+impl From<Cancelled> for Error {
+    fn from(_: Cancelled) -> Self {
+        Self(ErrorKind::Cancelled)
     }
 }
 

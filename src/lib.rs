@@ -127,6 +127,7 @@ mod geometry;
 mod light;
 mod math;
 mod parallel;
+mod progress;
 mod receiver;
 mod record;
 mod sampler;

@@ -24,6 +24,15 @@ pub(crate) fn sqrt64(x: f64) -> f64 {
     return libm::sqrt(x);
 }
 
+/// Returns the largest integer that is not above a number, saturated to what the type holds. NaN becomes zero.
+///
+/// A cast and a comparison: the floor of a float is a function call on targets without an instruction for it.
+#[inline(always)]
+pub(crate) fn floor_to_i64(x: f64) -> i64 {
+    let truncated = x as i64;
+    truncated.saturating_sub(i64::from(x < truncated as f64))
+}
+
 /// Angle in `[0, π]` whose cosine is `x`, which is first clamped to `[-1, 1]`.
 #[inline]
 pub(crate) fn acos(x: f32) -> f32 {

@@ -92,18 +92,23 @@ pub(crate) fn for_each<T>(elements: &mut [T], _size: usize, work: impl Fn(&mut T
 
 /// Maps all items, side by side if they are `threshold` or more. Each one is mapped alone and their order stays: the
 /// first failure in this order is the one that is returned.
-#[cfg_attr(not(feature = "rayon"), expect(unused_variables, reason = "one thread needs no threshold"))]
+#[cfg(feature = "rayon")]
 pub(crate) fn map<T: Sync, R: Send, F: Send>(
     items: &[T],
     threshold: usize,
     map: impl Fn(&T) -> Result<R, F> + Sync + Send,
 ) -> Result<Vec<R>, F> {
-    #[cfg(feature = "rayon")]
-    if items.len() >= threshold {
-        use rayon::prelude::*;
-        let mapped: Vec<Result<R, F>> = items.par_iter().map(map).collect();
-        return mapped.into_iter().collect();
+    if items.len() < threshold {
+        return items.iter().map(map).collect();
     }
+    use rayon::prelude::*;
+    let mapped: Vec<Result<R, F>> = items.par_iter().map(map).collect();
+    mapped.into_iter().collect()
+}
+
+/// Maps all items, one after the other.
+#[cfg(not(feature = "rayon"))]
+pub(crate) fn map<T, R, F>(items: &[T], _threshold: usize, map: impl Fn(&T) -> Result<R, F>) -> Result<Vec<R>, F> {
     items.iter().map(map).collect()
 }
 

@@ -15,8 +15,10 @@ mod validate;
 mod walk;
 
 pub(crate) use barycentric::{ARITY, Lattice, LatticeCell};
+pub(crate) use build::{ImageTree, RegisteredFunction, build_images, build_procedural, check_uv, image_work};
 pub use build::{Procedural, Texture};
-pub(crate) use build::{RegisteredFunction, TexturePyramid, build, build_procedural, check_uv};
+#[cfg(test)]
+pub(crate) use build::{TexturePyramid, build};
 pub(crate) use node::{CellBlock, LEAF, MAX_AVERAGE, Root, averages, below, holds, mean, storable};
 pub(crate) use validate::{validate, validate_roots};
 pub(crate) use walk::{

@@ -4,13 +4,16 @@ use super::descend::EnvironmentSample;
 use super::features::{BrightFeatures, FeatureLimits, finest};
 use super::image::EnvironmentImage;
 use super::pyramid::Pyramid;
-use super::resample::resample;
+use super::resample::{UNITS_PER_ROW, resample};
 use super::source::EnvironmentSource;
 use super::view::{Environment, EnvironmentHeader, EnvironmentView};
 use super::{MAX_PYRAMID_DEPTH, MAX_RADIANCE, MIN_RADIANCE, rotation};
 use crate::error::{Error, ErrorKind};
+use crate::progress::{Progress, Report};
 use crate::record::Filter;
 use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::ControlFlow;
 use glam::{Mat3, Vec3};
 
 impl Environment {
@@ -42,7 +45,24 @@ impl Environment {
     /// If a side is zero or above 65536, if the number of texels is not the product of the sides, if a texel is NaN,
     /// infinite or above 1e30, or if the resolution is zero or above 8192.
     pub fn new(image: &EnvironmentImage<'_>) -> Result<Self, Error> {
-        Self::with_limits(image, &FeatureLimits::default())
+        Self::with_limits(image, &FeatureLimits::default(), None)
+    }
+
+    /// Builds as [`new`](Self::new) does, for hosts that show progress or that need to be able to cancel: a sky of
+    /// 16384 x 8192 texels takes half a minute of one thread.
+    ///
+    /// `report` is called with the share of the work that is done, in `[0, 1]`, and last with 1;
+    /// [`ControlFlow::Break`] cancels the build. With the feature `rayon` the calls come from the threads that build,
+    /// several at once and not always in order.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`new`](Self::new), and one of which [`Error::is_cancelled`] is true if `report` has cancelled the build.
+    pub fn new_with(
+        image: &EnvironmentImage<'_>,
+        report: impl Fn(f32) -> ControlFlow<()> + Sync,
+    ) -> Result<Self, Error> {
+        Self::with_limits(image, &FeatureLimits::default(), Some(&report))
     }
 
     /// [`new`](Self::new) of a latitude-longitude image of `width * height` texels, the top row first.
@@ -64,21 +84,37 @@ impl Environment {
     }
 
     /// Builds an environment with other limits for its bright features.
-    pub(super) fn with_limits(image: &EnvironmentImage<'_>, limits: &FeatureLimits) -> Result<Self, Error> {
+    pub(super) fn with_limits(
+        image: &EnvironmentImage<'_>,
+        limits: &FeatureLimits,
+        report: Option<Report<'_>>,
+    ) -> Result<Self, Error> {
         let resolution = image.resolution.map(checked_depth).transpose()?;
         let source = EnvironmentSource::new(image)?;
         let depth = resolution.unwrap_or_else(|| depth_for(image.width as u64 * image.height as u64));
-        if let Some(radiance) = source.constant() {
-            return Ok(Self::uniform(radiance, source.clamped));
-        }
+        let progress = Progress::new(report, ((UNITS_PER_ROW + 1) << depth.max(1)) as f64);
+        let environment = match source.constant() {
+            Some(radiance) => Self::uniform(radiance, source.clamped),
+            None => Self::resampled(&source, depth, limits, &progress)?,
+        };
+        progress.finish()?;
+        Ok(environment)
+    }
+
+    fn resampled(
+        source: &EnvironmentSource<'_>,
+        depth: u32,
+        limits: &FeatureLimits,
+        progress: &Progress<'_>,
+    ) -> Result<Self, Error> {
         // One texel is cut by all seams of the map; take the mean of four instead.
-        let image = resample(&source, depth.max(1));
+        let image = resample(source, depth.max(1), progress)?;
         let features = if depth == 0 {
             BrightFeatures::none()
         } else {
             BrightFeatures::find(depth, finest(depth, &image), limits)
         };
-        let pyramid = Pyramid::new(depth.max(1), image, features.cap);
+        let pyramid = Pyramid::new(depth.max(1), image, features.cap, progress)?;
         let [low, high] = pyramid.ranges[0];
         if depth == 0 || low == high {
             return Ok(Self::uniform(pyramid.means[0], source.clamped));
@@ -87,7 +123,7 @@ impl Environment {
     }
 
     fn uniform(radiance: f32, clamped_texels: u32) -> Self {
-        let pyramid = Pyramid::new(0, vec![radiance], f32::INFINITY);
+        let pyramid = Pyramid { means: vec![radiance], ranges: Vec::new(), filtered: vec![radiance] };
         Self::from_pyramid(0, pyramid, BrightFeatures::none(), clamped_texels)
     }
 

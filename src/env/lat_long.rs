@@ -9,25 +9,33 @@
 //! Coordinates here are `[r, b]` with b = r f, a shear of the octant's triangle that keeps areas: a parallel is
 //! `r = R`, a meridian is `b = F r`.
 
+//!
+//! A texel's edges are cut at parallels and meridians. Every piece adds to the area of its own cell what lies between it
+//! and the cell's meridian of lower azimuth, and to all cells of its row with less azimuth their full width: the
+//! coverage of a scan converter. What is added on one side of the texel is taken away on the other.
+
 use super::source::EnvironmentSource;
-use crate::geometry;
 use crate::math::cos64;
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, SQRT_2};
 
-/// Share of a texel below which a polygon is taken for a rounding error of a shared edge.
+/// Share of a texel below which an area is taken for a rounding error of a shared edge. *Proved*: coordinates are
+/// rounded to 1e-16 of the map, which is 1e-12 of a texel of the largest one.
+///
+/// Larger: lit texels could be taken for black. Smaller: black ones could be taken for lit.
 const SLIVER: f64 = 1e-12;
-
-/// A texel or a part of one. A square that is cut twice along each of two lines has at most 8 vertices.
-type TexelPolygon = geometry::Polygon<f64, 12>;
 
 /// A latitude-longitude source, ready to be averaged over texels.
 pub(super) struct LatLong<'a> {
-    source: &'a EnvironmentSource,
+    source: &'a EnvironmentSource<'a>,
     /// Radii of the upper ends of the rows of a hemisphere, from the pole to the equator.
     radii: Vec<f64>,
+    /// Row of every radius that is a whole number of texels.
+    row_of_line: Vec<u32>,
     columns: usize,
     rows: usize,
+    /// Texels a side of the equal-area image, an even number.
+    size: usize,
 }
 
 /// Where an octant lies in the image.
@@ -40,6 +48,24 @@ struct Octant {
     mirrored: bool,
 }
 
+/// A corner of a texel, in texels from the pole's point: a whole radius and a whole `b`.
+type Corner = [usize; 2];
+
+/// A corner, and the cell that it lies in.
+#[derive(Clone, Copy, Default)]
+struct PlacedCorner {
+    point: [f64; 2],
+    row: usize,
+    column: usize,
+}
+
+/// How a texel covers the cells of one octant.
+#[derive(Default)]
+pub(super) struct CellCoverage {
+    /// By rows: what edges add to the area of a cell, and to that of the cells before it, for a width of one.
+    cells: Vec<[f64; 2]>,
+}
+
 /// Sums over the cells of one texel.
 #[derive(Default)]
 struct Sums {
@@ -48,17 +74,24 @@ struct Sums {
 }
 
 impl<'a> LatLong<'a> {
-    pub(super) fn new(source: &'a EnvironmentSource) -> Self {
+    pub(super) fn new(source: &'a EnvironmentSource<'a>, size: usize) -> Self {
         let (columns, rows) = (source.columns(), source.rows());
         let half = rows.div_ceil(2);
         // √2 sin(θ/2) with θ = π j / rows; an odd middle row ends at the equator, r = 1.
         let radius = |j: usize| SQRT_2 * cos64(FRAC_PI_2 * (1.0 - j as f64 / rows as f64));
-        let radii = (1..half).map(radius).chain([1.0]).collect();
-        Self { source, radii, columns, rows }
+        let radii: Vec<f64> = (1..half).map(radius).chain([1.0]).collect();
+        let side = 2.0 / size as f64;
+        let row_of_line = |line: usize| {
+            let radius = line as f64 * side;
+            radii.partition_point(|&r| r <= radius).min(radii.len() - 1) as u32
+        };
+        let row_of_line = (0..=size / 2).map(row_of_line).collect();
+        Self { source, radii, row_of_line, columns, rows, size }
     }
 
-    /// Mean radiance over texel `(x, y)` of an equal-area image of `size` texels a side, an even number.
-    pub(super) fn texel(&self, x: usize, y: usize, size: usize) -> f64 {
+    /// Mean radiance over texel `(x, y)` of the equal-area image.
+    pub(super) fn texel(&self, coverage: &mut CellCoverage, x: usize, y: usize) -> f64 {
+        let size = self.size;
         let half = size / 2;
         let (right, top) = (x >= half, y >= half);
         // Texels from the center lines.
@@ -66,85 +99,137 @@ impl<'a> LatLong<'a> {
         let l = if top { y - half } else { half - 1 - y };
         // Azimuth runs clockwise in the image, φ = -2πu: the quadrants x, -y and -x, y have u growing with f.
         let octant = |lower| Octant { lower, base: if right { 0.0 } else { 2.0 }, mirrored: right == top };
-        let side = 1.0 / half as f64;
-        let upper = |i: usize, j: usize| [(k + l + i + j) as f64 * side, (l + j) as f64 * side];
+        let upper = |i: usize, j: usize| [k + l + i + j, l + j];
         // The lower hemisphere is mirrored at the diamond: distances from the square's edges, axes exchanged.
-        let lower = |i: usize, j: usize| [(size - k - l - i - j) as f64 * side, (half - k - i) as f64 * side];
+        let lower = |i: usize, j: usize| [size - k - l - i - j, half - k - i];
         let mut sums = Sums::default();
-        let sliver = SLIVER * side * side;
+        let mut add = |lower: bool, corners: &[Corner]| self.add_octant(coverage, corners, octant(lower), &mut sums);
         if k + l + 2 <= half {
-            let polygon = TexelPolygon::new([upper(0, 0), upper(1, 0), upper(1, 1), upper(0, 1)]);
-            self.add_octant(polygon, octant(false), sliver, &mut sums);
+            add(false, &[upper(0, 0), upper(1, 0), upper(1, 1), upper(0, 1)]);
         } else if k + l >= half {
-            let polygon = TexelPolygon::new([lower(0, 0), lower(1, 0), lower(1, 1), lower(0, 1)]);
-            self.add_octant(polygon, octant(true), sliver, &mut sums);
+            add(true, &[lower(0, 0), lower(1, 0), lower(1, 1), lower(0, 1)]);
         } else {
             // The equator is this texel's diagonal.
-            let polygon = TexelPolygon::new([upper(0, 0), upper(1, 0), upper(0, 1)]);
-            self.add_octant(polygon, octant(false), sliver, &mut sums);
-            let polygon = TexelPolygon::new([lower(1, 1), lower(0, 1), lower(1, 0)]);
-            self.add_octant(polygon, octant(true), sliver, &mut sums);
+            add(false, &[upper(0, 0), upper(1, 0), upper(0, 1)]);
+            add(true, &[lower(1, 1), lower(0, 1), lower(1, 0)]);
         }
         // By the summed area, not the texel's: a uniform region keeps its value to the last bit.
         if sums.area > 0.0 { sums.flux / sums.area } else { 0.0 }
     }
 
-    /// Cuts a polygon of one octant along the parallels.
-    fn add_octant(&self, polygon: TexelPolygon, octant: Octant, sliver: f64, sums: &mut Sums) {
-        let (low, high) = range(polygon.vertices().iter().map(|p| p[0]));
-        let mut rest = polygon;
-        let mut row = self.radii.partition_point(|&r| r <= low).min(self.radii.len() - 1);
-        while row + 1 < self.radii.len() && self.radii[row] < high {
-            let radius = self.radii[row];
-            let (part, further) = rest.split(|[r, _]| r - radius);
-            self.add_row(part, row, octant, sliver, sums);
-            rest = further;
-            row += 1;
+    /// Adds the cells under a convex polygon of one octant, of at most four corners.
+    fn add_octant(&self, coverage: &mut CellCoverage, corners: &[Corner], octant: Octant, sums: &mut Sums) {
+        let side = 2.0 / self.size as f64;
+        let columns_a_quarter = 0.25 * self.columns as f64;
+        let mut placed = [PlacedCorner::default(); 4];
+        let (mut rows, mut columns) = ([usize::MAX, 0], [usize::MAX, 0]);
+        for (placed, corner) in placed.iter_mut().zip(corners) {
+            let row = self.row_of_line[corner[0]] as usize;
+            rows = [rows[0].min(row), rows[1].max(row)];
+            let mut column = 0;
+            if corner[0] > 0 {
+                let turns = octant.base + corner[1] as f64 / corner[0] as f64;
+                column = ((turns * columns_a_quarter) as usize).min(self.columns - 1);
+                columns = [columns[0].min(column), columns[1].max(column)];
+            }
+            *placed = PlacedCorner { point: corner.map(|n| n as f64 * side), row, column };
         }
-        self.add_row(rest, row, octant, sliver, sums);
+        let width = columns[1] - columns[0] + 1;
+        coverage.cells.clear();
+        coverage.cells.resize(width * (rows[1] - rows[0] + 1), [0.0; 2]);
+        let placed = &mut placed[..corners.len()];
+        for i in 0..placed.len() {
+            let (mut from, mut to) = (placed[i], placed[(i + 1) % corners.len()]);
+            // The pole belongs to all meridians: an edge that ends there runs along one.
+            if from.point[0] == 0.0 {
+                from.column = to.column;
+            } else if to.point[0] == 0.0 {
+                to.column = from.column;
+            }
+            self.add_edge(&mut coverage.cells, from, to, octant, [rows[0], columns[0], width]);
+        }
+        // The upper hemisphere's corners run the other way around.
+        let sign = if octant.lower { 1.0 } else { -1.0 };
+        let sliver = SLIVER * side * side;
+        let cell_width = sign / columns_a_quarter;
+        for (row, cells) in (rows[0]..).zip(coverage.cells.chunks_exact(width)) {
+            let row = if octant.lower { self.rows - 1 - row } else { row };
+            let mut before = 0.0;
+            for (column, [own, all_before]) in (columns[0]..columns[1] + 1).zip(cells).rev() {
+                let shared = sign * own + before * cell_width;
+                before += all_before;
+                if shared > sliver {
+                    let column = if octant.mirrored { self.columns - 1 - column } else { column };
+                    sums.flux += shared * self.source.cell(column, row);
+                    sums.area += shared;
+                }
+            }
+        }
     }
 
-    /// Cuts a polygon of one row along the meridians.
-    fn add_row(&self, polygon: TexelPolygon, row: usize, octant: Octant, sliver: f64, sums: &mut Sums) {
-        if area(&polygon) <= sliver {
+    /// Cuts an edge at parallels and meridians, and adds the area under its pieces. `window` has the first row and column
+    /// of the cells, and the number of their columns.
+    #[inline]
+    fn add_edge(
+        &self,
+        cells: &mut [[f64; 2]],
+        from: PlacedCorner,
+        to: PlacedCorner,
+        octant: Octant,
+        window: [usize; 3],
+    ) {
+        let [r, b] = from.point;
+        let [dr, db] = [to.point[0] - r, to.point[1] - b];
+        // The equator.
+        if dr == 0.0 {
             return;
         }
-        let row = if octant.lower { self.rows - 1 - row } else { row };
-        // The pole belongs to all meridians: the other vertices tell which ones.
-        let (low, high) = range(polygon.vertices().iter().filter(|p| p[0] > 0.0).map(|p| p[1] / p[0]));
         let per_column = 4.0 / self.columns as f64;
-        let mut rest = polygon;
-        let mut column = (((octant.base + low) / per_column) as usize).min(self.columns - 1);
-        loop {
-            let end = (column + 1) as f64 * per_column - octant.base;
-            let last = column + 1 >= self.columns || end >= high;
-            let part = if last {
-                rest
-            } else {
-                let (part, further) = rest.split(|[r, b]| b - end * r);
-                rest = further;
-                part
-            };
-            let shared = area(&part);
-            if shared > sliver {
-                let column = if octant.mirrored { self.columns - 1 - column } else { column };
-                sums.flux += shared * self.source.cell(column, row);
-                sums.area += shared;
+        let meridian = |column: usize| column as f64 * per_column - octant.base;
+        let (mut row, mut column) = (from.row, from.column);
+        let next_row = |row: usize| {
+            if row == to.row {
+                return f64::INFINITY;
             }
-            if last {
+            let line = if row < to.row { row } else { row - 1 };
+            (self.radii[line] - r) / dr
+        };
+        let next_column = |column: usize| {
+            if column == to.column {
+                return f64::INFINITY;
+            }
+            let f = meridian(if column < to.column { column + 1 } else { column });
+            (f * r - b) / (db - f * dr)
+        };
+        let (mut row_at, mut column_at) = (next_row(row), next_column(column));
+        let mut start = 0.0;
+        loop {
+            let end = row_at.min(column_at).min(1.0).max(start);
+            let piece = dr * (end - start);
+            let middle = 0.5 * (start + end);
+            let (r, b) = (r + middle * dr, b + middle * db);
+            let cell = &mut cells[(row - window[0]) * window[2] + column - window[1]];
+            cell[0] += (b - meridian(column) * r) * piece;
+            cell[1] += r * piece;
+            if end >= 1.0 {
                 return;
             }
-            column += 1;
+            start = end;
+            if row_at <= column_at {
+                if row < to.row {
+                    row += 1;
+                } else {
+                    row -= 1;
+                }
+                row_at = next_row(row);
+            } else {
+                if column < to.column {
+                    column += 1;
+                } else {
+                    column -= 1;
+                }
+                column_at = next_column(column);
+            }
         }
     }
-}
-
-/// Returns the area of a polygon in either sense of rotation.
-fn area(polygon: &TexelPolygon) -> f64 {
-    0.5 * polygon.fan().map(|(_, double)| double).sum::<f64>().abs()
-}
-
-/// Smallest and largest of some numbers.
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
 }

@@ -3,6 +3,8 @@
 //! The level of depth `d` has `2^d` x `2^d` texels; depth 0 is the whole sphere. Levels follow each other, the
 //! coarsest first, so that a texel's place does not depend on the size of the image.
 
+use crate::parallel::{WORTHWHILE, for_each_chunk};
+use crate::progress::{Cancelled, Progress};
 use crate::warp::equal_area::wrap_texel_log2;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -27,51 +29,86 @@ pub(super) struct Pyramid {
 impl Pyramid {
     /// Builds all levels of an image of `2^depth` texels a side. Its texels are 0 or in `[1e-30, 1e30]`, and
     /// stand at the end of `means`, which has room for all levels. Ranges and filtered means are those of the image
-    /// capped at `cap`.
-    pub(super) fn new(depth: u32, mut means: Vec<f32>, cap: f32) -> Self {
+    /// capped at `cap`. Every row of the finest filtered level is a unit of progress.
+    pub(super) fn new(depth: u32, mut means: Vec<f32>, cap: f32, progress: &Progress<'_>) -> Result<Self, Cancelled> {
+        fill_means(depth, &mut means);
+        progress.check()?;
         let mut ranges = vec![[0.0; 2]; level_start(depth)];
         for d in (0..depth).rev() {
-            let size = 1_u32 << d;
-            for y in 0..size {
-                for x in 0..size {
-                    let at = level_start(d) + ((y << d) | x) as usize;
-                    means[at] = parent_mean(children(&means, d, x, y));
-                    ranges[at] = if d + 1 == depth {
-                        parent_range(children(&means, d, x, y).map(|v| [v.min(cap); 2]))
-                    } else {
-                        parent_range(children(&ranges, d, x, y))
-                    };
+            let (level, finer) = ranges[..level_start((d + 2).min(depth))].split_at_mut(level_start(d + 1));
+            let finest = &means[level_start(depth)..];
+            for_each_texel(&mut level[level_start(d)..], d, |x, y| {
+                if d + 1 == depth {
+                    parent_range(children_in(finest, d, x, y).map(|v| [v.min(cap); 2]))
+                } else {
+                    parent_range(children_in(finer, d, x, y))
                 }
-            }
+            });
         }
-        let mut filtered = Vec::with_capacity(means.len());
-        let capped = (cap < f32::INFINITY).then(|| capped_means(depth, &means, cap));
-        let image = capped.as_ref().unwrap_or(&means);
+        progress.check()?;
+        // The finest level is capped as it is read; of the others, which are a third of it, there is a copy.
+        let capped = if cap < f32::INFINITY { capped_means(depth, &means, cap) } else { Vec::new() };
+        let mut filtered = vec![0.0; means.len()];
         for d in 0..=depth {
-            filter(d, &image[level_start(d)..level_start(d + 1)], &mut filtered);
+            let levels = if d == depth || capped.is_empty() { &means } else { &capped };
+            let level = &levels[level_start(d)..level_start(d + 1)];
+            let out = &mut filtered[level_start(d)..level_start(d + 1)];
+            filter(d, level, cap, out, (d == depth).then_some(progress));
         }
-        Self { means, ranges, filtered }
+        progress.check()?;
+        Ok(Self { means, ranges, filtered })
     }
 }
 
-/// Means of all levels of the capped image.
-fn capped_means(depth: u32, means: &[f32], cap: f32) -> Vec<f32> {
-    let mut capped: Vec<f32> = means.iter().map(|&v| v.min(cap)).collect();
+/// Computes all levels above the finest one.
+fn fill_means(depth: u32, means: &mut [f32]) {
     for d in (0..depth).rev() {
-        for texel in 0..1_u32 << (2 * d) {
-            let (x, y) = (texel & ((1 << d) - 1), texel >> d);
-            capped[level_start(d) + texel as usize] = parent_mean(children(&capped, d, x, y));
-        }
+        let (level, finer) = means.split_at_mut(level_start(d + 1));
+        for_each_texel(&mut level[level_start(d)..], d, |x, y| parent_mean(children_in(finer, d, x, y)));
+    }
+}
+
+/// Returns the means of all levels of the capped image but the finest.
+fn capped_means(depth: u32, means: &[f32], cap: f32) -> Vec<f32> {
+    let mut capped = vec![0.0; level_start(depth)];
+    if depth > 0 {
+        let finest = &means[level_start(depth)..];
+        for_each_texel(&mut capped[level_start(depth - 1)..], depth - 1, |x, y| {
+            parent_mean(children_in(finest, depth - 1, x, y).map(|v| v.min(cap)))
+        });
+        fill_means(depth - 1, &mut capped);
     }
     capped
+}
+
+/// Computes every texel of a level alone, many rows side by side.
+fn for_each_texel<T: Send>(level: &mut [T], depth: u32, texel: impl Fn(u32, u32) -> T + Sync + Send) {
+    let rows = rows_at_once(depth);
+    for_each_chunk(level, rows << depth, |chunk, texels| {
+        for (row, texels) in texels.chunks_exact_mut(1 << depth).enumerate() {
+            let y = (chunk * rows + row) as u32;
+            (0..).zip(texels).for_each(|(x, out)| *out = texel(x, y));
+        }
+    });
+}
+
+/// Number of rows of a level that are worth handing to another thread.
+fn rows_at_once(depth: u32) -> usize {
+    (WORTHWHILE >> depth).max(1)
+}
+
+/// The four texels of a level below a texel of depth `d`, row by row.
+#[inline]
+fn children_in<T: Copy>(level: &[T], d: u32, x: u32, y: u32) -> [T; 4] {
+    let row = ((y << (d + 2)) | (x << 1)) as usize;
+    let next = row + (2 << d);
+    [level[row], level[row + 1], level[next], level[next + 1]]
 }
 
 /// The four texels below a texel of depth `d`, row by row.
 #[inline]
 pub(super) fn children<T: Copy>(levels: &[T], d: u32, x: u32, y: u32) -> [T; 4] {
-    let row = level_start(d + 1) + ((y << (d + 2)) | (x << 1)) as usize;
-    let next = row + (2 << d);
-    [levels[row], levels[row + 1], levels[next], levels[next + 1]]
+    children_in(&levels[level_start(d + 1)..], d, x, y)
 }
 
 /// Mean of four means, rounded once.
@@ -86,28 +123,40 @@ pub(super) fn parent_range(children: [[f32; 2]; 4]) -> [f32; 2] {
     children.into_iter().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_default()
 }
 
-/// Appends the 3x3 averages of one level.
-fn filter(depth: u32, level: &[f32], filtered: &mut Vec<f32>) {
+/// Computes the 3x3 averages of one level, capped.
+fn filter(depth: u32, level: &[f32], cap: f32, filtered: &mut [f32], progress: Option<&Progress<'_>>) {
     let size = 1_i32 << depth;
+    let value = |at: usize| f64::from(level[at].min(cap));
     let at = |x: i32, y: i32| -> f64 {
         let (x, y) = wrap_texel_log2(x, y, depth);
-        f64::from(level[((y << depth) | x) as usize])
+        value(((y << depth) | x) as usize)
     };
-    for y in 0..size {
-        for x in 0..size {
-            let inside = x > 0 && y > 0 && x + 1 < size && y + 1 < size;
-            let sum: f64 = if inside {
-                let row = |y: i32| {
-                    let start = ((y << depth) | (x - 1)) as usize;
-                    let [a, b, c] = [level[start], level[start + 1], level[start + 2]].map(f64::from);
-                    a + b + c
-                };
-                row(y - 1) + row(y) + row(y + 1)
-            } else {
-                let row = |y: i32| at(x - 1, y) + at(x, y) + at(x + 1, y);
-                row(y - 1) + row(y) + row(y + 1)
+    let texel = |x: i32, y: i32| {
+        let inside = x > 0 && y > 0 && x + 1 < size && y + 1 < size;
+        let sum: f64 = if inside {
+            let row = |y: i32| {
+                let start = ((y << depth) | (x - 1)) as usize;
+                let [a, b, c] = [start, start + 1, start + 2].map(value);
+                a + b + c
             };
-            filtered.push((sum / 9.0) as f32);
+            row(y - 1) + row(y) + row(y + 1)
+        } else {
+            let row = |y: i32| at(x - 1, y) + at(x, y) + at(x + 1, y);
+            row(y - 1) + row(y) + row(y + 1)
+        };
+        (sum / 9.0) as f32
+    };
+    let rows = rows_at_once(depth);
+    for_each_chunk(filtered, rows << depth, |chunk, texels| {
+        if let Some(progress) = progress {
+            if progress.check().is_err() {
+                return;
+            }
+            progress.add(texels.len() >> depth);
         }
-    }
+        for (row, texels) in texels.chunks_exact_mut(1 << depth).enumerate() {
+            let y = (chunk * rows + row) as i32;
+            (0..).zip(texels).for_each(|(x, out)| *out = texel(x, y));
+        }
+    });
 }

@@ -3,9 +3,9 @@
 use super::image::{EnvironmentImage, Poles};
 use super::{MAX_RADIANCE, MIN_RADIANCE};
 use crate::error::{Error, ErrorKind};
+use crate::parallel;
 use crate::record::Filter;
 use crate::warp::equal_area::wrap_texel;
-use alloc::vec::Vec;
 
 /// Largest side of an image, in texels. *Proved*: twice the side times the 2^13 texels of a resampled side is exact in
 /// the integers and doubles that resampling uses.
@@ -22,21 +22,60 @@ pub(super) enum Edges {
     EqualArea,
 }
 
-/// A checked image, and the grid of cells of constant radiance that stands for it.
-#[derive(Clone, Debug)]
-pub(super) struct EnvironmentSource {
-    texels: Vec<f32>,
+/// A checked image, borrowed from the host, and the grid of cells of constant radiance that stands for it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EnvironmentSource<'a> {
+    /// As the host has them: [`clamped`] when they are read.
+    texels: &'a [f32],
     width: usize,
     height: usize,
     edges: Edges,
     filter: Filter,
     /// Number of texels that were negative.
     pub(super) clamped: u32,
+    /// Least and largest radiance.
+    range: [f32; 2],
 }
 
-impl EnvironmentSource {
-    /// Checks an image, and copies its texels.
-    pub(super) fn new(image: &EnvironmentImage<'_>) -> Result<Self, Error> {
+/// Returns the radiance of a texel that was not refused.
+#[inline(always)]
+fn clamped(value: f32) -> f32 {
+    if value > 0.0 { value.max(MIN_RADIANCE) } else { 0.0 }
+}
+
+/// What is found in a part of an image.
+#[derive(Clone, Copy)]
+struct CheckedPart {
+    is_valid: bool,
+    negative: usize,
+    range: [f32; 2],
+}
+
+impl CheckedPart {
+    fn new(texels: &[f32]) -> Self {
+        let mut part = Self { is_valid: true, negative: 0, range: [f32::INFINITY, 0.0] };
+        for &value in texels {
+            // NaN fails the comparison.
+            part.is_valid &= value.abs() < f32::INFINITY && value <= MAX_RADIANCE;
+            part.negative += usize::from(value < 0.0);
+            let value = clamped(value);
+            part.range = [value.min(part.range[0]), value.max(part.range[1])];
+        }
+        part
+    }
+
+    fn merge(self, other: Self) -> Self {
+        Self {
+            is_valid: self.is_valid && other.is_valid,
+            negative: self.negative + other.negative,
+            range: [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])],
+        }
+    }
+}
+
+impl<'a> EnvironmentSource<'a> {
+    /// Checks an image.
+    pub(super) fn new(image: &EnvironmentImage<'a>) -> Result<Self, Error> {
         let EnvironmentImage { width, height, luminance: texels, edges, filter, .. } = *image;
         let what = "environment";
         if !(1..=MAX_IMAGE_SIDE).contains(&width) || !(1..=MAX_IMAGE_SIDE).contains(&height) {
@@ -46,28 +85,25 @@ impl EnvironmentSource {
         if texels.len() as u64 != width as u64 * height as u64 {
             return Err(Error(ErrorKind::TexelCount { what, width, height, found: texels.len() }));
         }
-        let mut clamped = 0_u32;
-        let check = |(i, &value): (usize, &f32)| {
-            let (x, y) = (i % width, i / width);
-            if !value.is_finite() {
-                return Err(Error(ErrorKind::Texel { what, x, y, value }));
-            }
-            if value > MAX_RADIANCE {
-                return Err(Error(ErrorKind::TexelTooBright { what, x, y, value, limit: MAX_RADIANCE }));
-            }
-            if value < 0.0 {
-                clamped = clamped.saturating_add(1);
-            }
-            Ok(if value > 0.0 { value.max(MIN_RADIANCE) } else { 0.0 })
-        };
-        let texels = texels.iter().enumerate().map(check).collect::<Result<_, _>>()?;
-        Ok(Self { texels, width, height, edges, filter, clamped })
+        let part = parallel::reduce(texels, CheckedPart::new, CheckedPart::merge);
+        if !part.is_valid {
+            let is_wrong = |value: &f32| !(value.is_finite() && *value <= MAX_RADIANCE);
+            let i = texels.iter().position(is_wrong).unwrap_or(0);
+            let (x, y, value) = (i % width, i / width, texels[i]);
+            return Err(Error(if value.is_finite() {
+                ErrorKind::TexelTooBright { what, x, y, value, limit: MAX_RADIANCE }
+            } else {
+                ErrorKind::Texel { what, x, y, value }
+            }));
+        }
+        let negative = u32::try_from(part.negative).unwrap_or(u32::MAX);
+        Ok(Self { texels, width, height, edges, filter, clamped: negative, range: part.range })
     }
 
     /// The radiance of every direction, if it is the same everywhere.
     pub(super) fn constant(&self) -> Option<f32> {
-        let first = self.texels[0];
-        self.texels.iter().all(|&v| v == first).then_some(first)
+        let [low, high] = self.range;
+        (low == high).then_some(high)
     }
 
     /// How the image continues beyond its edges.
@@ -95,9 +131,10 @@ impl EnvironmentSource {
     }
 
     /// Mean radiance over a cell: the texel's, or the average of the interpolated image over a quadrant of it.
+    #[inline]
     pub(super) fn cell(&self, column: usize, row: usize) -> f64 {
         if self.filter == Filter::Nearest {
-            return f64::from(self.texels[row * self.width + column]);
+            return f64::from(clamped(self.texels[row * self.width + column]));
         }
         let (x, y) = ((column / 2) as i32, (row / 2) as i32);
         // Towards the neighbor that the quadrant lies next to.
@@ -108,9 +145,10 @@ impl EnvironmentSource {
     }
 
     /// Texel at a place inside or one step outside of the image.
+    #[inline]
     fn texel(&self, x: i32, y: i32) -> f64 {
         let (width, height) = (self.width as i32, self.height as i32);
-        let at = |x: i32, y: i32| f64::from(self.texels[y as usize * self.width + x as usize]);
+        let at = |x: i32, y: i32| f64::from(clamped(self.texels[y as usize * self.width + x as usize]));
         if (0..width).contains(&x) && (0..height).contains(&y) {
             return at(x, y);
         }

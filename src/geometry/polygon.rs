@@ -49,54 +49,17 @@ impl<C: Coordinate, const CAPACITY: usize> Polygon<C, CAPACITY> {
     /// Returns the part where `side`, a linear function of the point, is not negative.
     #[inline]
     pub(crate) fn clip(&self, side: impl Fn([C; 2]) -> C) -> Self {
-        self.clip_with(side, |cut| cut)
-    }
-
-    /// Returns the part on one side of a line along an axis: where the coordinate of the other axis is at least `at`,
-    /// or at most that if `sign` is minus one. New vertices lie on the line exactly.
-    #[inline]
-    pub(crate) fn clip_axis(&self, axis: usize, at: C, sign: C) -> Self {
-        let snap = |mut cut: [C; 2]| {
-            cut[axis] = at;
-            cut
-        };
-        self.clip_with(|point| sign * (point[axis] - at), snap)
-    }
-
-    #[inline]
-    fn clip_with(&self, side: impl Fn([C; 2]) -> C, snap: impl Fn([C; 2]) -> [C; 2]) -> Self {
         let zero = C::default();
         let mut out = Self::empty();
         self.for_each_edge(side, |(a, da), (b, db)| {
             if (da < zero) != (db < zero) {
-                out.push(snap(crossing((a, da), (b, db))));
+                out.push(crossing((a, da), (b, db)));
             }
             if db >= zero {
                 out.push(b);
             }
         });
         out
-    }
-
-    /// Returns the parts where `side`, a linear function of the point, is negative and where it is positive.
-    #[inline]
-    pub(crate) fn split(&self, side: impl Fn([C; 2]) -> C) -> (Self, Self) {
-        let zero = C::default();
-        let (mut negative, mut positive) = (Self::empty(), Self::empty());
-        self.for_each_edge(side, |(a, da), (b, db)| {
-            if da * db < zero {
-                let cut = crossing((a, da), (b, db));
-                negative.push(cut);
-                positive.push(cut);
-            }
-            if db <= zero {
-                negative.push(b);
-            }
-            if db >= zero {
-                positive.push(b);
-            }
-        });
-        (negative, positive)
     }
 
     /// Visits the ends of every edge, each with its value of `side`. The first edge ends at the first vertex.
@@ -158,22 +121,13 @@ mod tests {
     #[test]
     fn clipped_area() {
         let triangle = Polygon::new([[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]);
-        let strip =
-            |polygon: Polygon<f64, 12>, axis, lo, hi| polygon.clip_axis(axis, lo, 1.0).clip_axis(axis, hi, -1.0);
+        let strip = |polygon: Polygon<f64, 12>, axis: usize, lo: f64, hi: f64| {
+            polygon.clip(|point| point[axis] - lo).clip(|point| hi - point[axis])
+        };
         assert_eq!(area(triangle), 8.0);
         assert_eq!(area(strip(triangle, 0, 1.0, 2.0)), 2.5);
         assert_eq!(area(strip(strip(triangle, 0, 1.0, 2.0), 1, 0.0, 1.0)), 1.0);
         assert_eq!(area(strip(triangle, 1, 5.0, 6.0)), 0.0);
         assert_eq!(area(triangle.clip(|[x, y]| x + y - 2.0)), 6.0);
-    }
-
-    #[test]
-    fn parts_add_up() {
-        let square = Polygon::new([[5.0, 7.0], [6.0, 7.0], [6.0, 8.0], [5.0, 8.0]]);
-        let (below, above) = square.split(|[x, y]| x + y - 12.25);
-        assert!((area(below) - 0.03125).abs() < 1e-15 && (area(above) - 0.96875).abs() < 1e-15);
-        let (nothing, all) = square.split(|[x, _]| x - 5.0);
-        assert_eq!((area(nothing), area(all)), (0.0, 1.0));
-        assert_eq!(area(Polygon::empty().split(|[x, _]| x).0), 0.0);
     }
 }

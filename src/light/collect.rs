@@ -6,15 +6,16 @@ use alloc::vec::Vec;
 
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
 use super::{Energies, Illumination, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
-use crate::blas::{self, CellBlock, Procedural, RegisteredFunction, Root, Texture, TexturePyramid};
+use crate::blas::{self, CellBlock, ImageTree, Procedural, RegisteredFunction, Root, Texture};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
+use crate::progress::Progress;
 use crate::record::{MeshId, TextureId};
 use crate::tlas::MAX_LEAVES;
 
 /// What a textured weight is read from.
 enum WeightTexture<'a> {
-    Image(TexturePyramid<'a>),
+    Image(Texture<'a>),
     Function(RegisteredFunction<'a>),
 }
 
@@ -28,8 +29,23 @@ pub(crate) struct LightCollection<'a> {
     /// Where each mesh starts in `indices`, and the end.
     meshes: Vec<u32>,
     cells: Vec<CellBlock>,
-    /// Trees over textures by texture and the bits of the three uvs.
-    shared: BTreeMap<(u32, [u32; 6]), Root>,
+    /// Trees over functions by texture and the bits of the three uvs.
+    shared: BTreeMap<TreeKey, Root>,
+    /// Trees over images that are still to be built, and their numbers.
+    images: Vec<ImageTree<'a>>,
+    shared_images: BTreeMap<TreeKey, u32>,
+    /// Triangles, by their places in `indices`, with the numbers of their trees over images.
+    pending: Vec<(u32, u32)>,
+}
+
+/// A texture and the bits of the three uvs: what a tree depends on.
+type TreeKey = (u32, [u32; 6]);
+
+/// The weight over a triangle as far as it is known when the triangle is added.
+enum AddedWeight {
+    Tree(Root),
+    /// The number of a tree over an image.
+    Pending(u32),
 }
 
 impl<'a> LightCollection<'a> {
@@ -41,6 +57,9 @@ impl<'a> LightCollection<'a> {
             meshes: vec![0],
             cells: Vec::new(),
             shared: BTreeMap::new(),
+            images: Vec::new(),
+            shared_images: BTreeMap::new(),
+            pending: Vec::new(),
         }
     }
 
@@ -50,7 +69,7 @@ impl<'a> LightCollection<'a> {
     }
 
     pub(crate) fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
-        self.push_texture(WeightTexture::Image(TexturePyramid::new(texture)))
+        self.push_texture(WeightTexture::Image(texture))
     }
 
     pub(crate) fn add_procedural(&mut self, function: &'a dyn Procedural) -> TextureId {
@@ -82,6 +101,65 @@ impl<'a> LightCollection<'a> {
         }
         self.meshes.push(self.indices.len() as u32);
         Ok(MeshId(number as u32))
+    }
+
+    /// Returns the units of work of [`Self::build_images`].
+    pub(crate) fn image_work(&self) -> f64 {
+        blas::image_work(&self.images)
+    }
+
+    /// Number of triangles that may emit, by what is known of them.
+    pub(crate) fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Builds the trees over images. Only then the lights are complete.
+    ///
+    /// # Errors
+    ///
+    /// If there are too many nodes, or if the host has cancelled the build.
+    pub(crate) fn build_images(&mut self, progress: &Progress<'_>) -> Result<(), Error> {
+        let trees = core::mem::take(&mut self.images);
+        // One image after the other: only few pyramids exist at a time.
+        let mut order: Vec<u32> = (0..trees.len() as u32).collect();
+        order.sort_by_key(|&tree| trees[tree as usize].texture);
+        let sorted: Vec<ImageTree<'_>> = order.iter().map(|&tree| trees[tree as usize]).collect();
+        let built = blas::build_images(&sorted, &mut self.cells, progress)?;
+        let mut roots = vec![Root::constant(0.0); built.len()];
+        for (tree, root) in order.into_iter().zip(built) {
+            roots[tree as usize] = root;
+        }
+        for (at, tree) in core::mem::take(&mut self.pending) {
+            let (index, root) = (&mut self.indices[at as usize], roots[tree as usize]);
+            if let Some(triangle) = self.triangles.get_mut(*index as usize) {
+                triangle.root = root;
+            } else if root.average == 0.0 {
+                *index = NO_LEAF;
+            }
+        }
+        self.remove_black();
+        Ok(())
+    }
+
+    /// Removes the triangles on which an image turned out to be black.
+    fn remove_black(&mut self) {
+        let mut count = 0;
+        let places: Vec<u32> = self
+            .triangles
+            .iter()
+            .map(|triangle| {
+                let is_kept = triangle.root.average != 0.0;
+                count += u32::from(is_kept);
+                if is_kept { count - 1 } else { NO_LEAF }
+            })
+            .collect();
+        if count as usize == self.triangles.len() {
+            return;
+        }
+        self.triangles.retain(|triangle| triangle.root.average != 0.0);
+        for index in &mut self.indices {
+            *index = places.get(*index as usize).copied().unwrap_or(*index);
+        }
     }
 
     /// Returns a light by its index among those that may emit.
@@ -156,7 +234,15 @@ impl<'a> LightCollection<'a> {
     }
 
     fn add_triangle(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<(), Error> {
-        let root = self.root(mesh, indices)?;
+        let weight = self.weight(mesh, indices)?;
+        let root = match weight {
+            AddedWeight::Tree(root) => root,
+            AddedWeight::Pending(tree) => {
+                self.pending.push((self.indices.len() as u32, tree));
+                // Until it is built, the triangle may emit.
+                Root::constant(1.0)
+            }
+        };
         let two_sided = if mesh.sides == Sides::Two { LightTriangle::TWO_SIDED } else { 0 };
         let portal = if mesh.kind == MeshKind::Portal { LightTriangle::PORTAL } else { 0 };
         let triangle = LightTriangle {
@@ -184,24 +270,37 @@ impl<'a> LightCollection<'a> {
         }
     }
 
-    /// Returns the tree over the texture of one triangle, built only if no triangle before has the same.
-    fn root(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<Root, Error> {
+    /// Returns the weight over one triangle: the tree over a function, built only if no triangle before has the same, or
+    /// the number of one over an image.
+    fn weight(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<AddedWeight, Error> {
         let texture = match mesh.weight {
-            Weight::Constant(weight) => return Ok(Root::constant(blas::storable(f64::from(weight)))),
+            Weight::Constant(weight) => {
+                return Ok(AddedWeight::Tree(Root::constant(blas::storable(f64::from(weight)))));
+            }
             Weight::Texture(TextureId(texture)) => texture,
         };
-        let uvs = indices.map(|index| mesh.uvs[index as usize]);
-        let [a, b, c] = uvs.map(|uv| uv.to_array().map(f32::to_bits));
+        let uv = indices.map(|index| mesh.uvs[index as usize]);
+        let [a, b, c] = uv.map(|uv| uv.to_array().map(f32::to_bits));
         let key = (texture, [a[0], a[1], b[0], b[1], c[0], c[1]]);
-        if let Some(&root) = self.shared.get(&key) {
-            return Ok(root);
-        }
         let mesh = self.meshes.len() - 1;
-        let root = match &mut self.textures[texture as usize] {
-            WeightTexture::Image(image) => blas::build(image, uvs, &mut self.cells),
-            WeightTexture::Function(function) => blas::build_procedural(function, mesh, uvs, &mut self.cells),
-        }?;
-        self.shared.insert(key, root);
-        Ok(root)
+        match &mut self.textures[texture as usize] {
+            WeightTexture::Image(image) => {
+                let image = *image;
+                let images = &mut self.images;
+                let tree = *self.shared_images.entry(key).or_insert_with(|| {
+                    images.push(ImageTree { image, texture, uv });
+                    images.len() as u32 - 1
+                });
+                Ok(AddedWeight::Pending(tree))
+            }
+            WeightTexture::Function(function) => {
+                if let Some(&root) = self.shared.get(&key) {
+                    return Ok(AddedWeight::Tree(root));
+                }
+                let root = blas::build_procedural(function, mesh, uv, &mut self.cells)?;
+                self.shared.insert(key, root);
+                Ok(AddedWeight::Tree(root))
+            }
+        }
     }
 }

@@ -6,11 +6,16 @@ use core::ops::ControlFlow;
 use super::lights::LightSampler;
 use crate::blas::{Procedural, Texture};
 use crate::env::Environment;
-use crate::error::{Error, ErrorKind};
+use crate::error::Error;
 use crate::light::{Energies, Illumination, LightCollection, Mesh};
 use crate::parallel;
+use crate::progress::{Progress, Report};
 use crate::record::{MeshId, TextureId};
-use crate::tlas::{self, Arity, Report};
+use crate::tlas::{self, Arity};
+
+/// Share of the time that lights take after which all of them have found their place; the rest is the collapse and the
+/// bounds. Only shown to the host: chosen, not measured.
+const PLACED: f64 = 0.9;
 
 /// Collects the lights of a scene and builds a [`LightSampler`].
 ///
@@ -139,11 +144,11 @@ impl<'a> LightSamplerBuilder<'a> {
         self.collection.add_mesh(mesh)
     }
 
-    /// Builds the tree over all triangles that can emit light.
+    /// Builds the trees over textures, and the tree over all triangles that can emit light.
     ///
     /// # Errors
     ///
-    /// If there are more triangles than the tree can number (2^28 - 1).
+    /// If there are more triangles than the tree can number (2^28 - 1), or more cells of textures (2^34).
     pub fn build(self) -> Result<LightSampler, Error> {
         self.build_reporting(None)
     }
@@ -164,20 +169,20 @@ impl<'a> LightSamplerBuilder<'a> {
     fn build_reporting(self, report: Option<Report<'_>>) -> Result<LightSampler, Error> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
         let energies = Energies::new(&environment, &[], &[]);
-        let collection = self.collection;
+        let mut collection = self.collection;
+        let work = collection.image_work() + collection.triangle_count() as f64 / PLACED;
+        let progress = Progress::new(report, work);
+        collection.build_images(&progress)?;
         let emitting = collection.emitting(&energies)?;
         let total = collection.total_energy(&energies);
         let bounds = |i: u32| energies.bounds(collection.light(emitting[i as usize]), total).0;
-        let cancelled = |_| Error(ErrorKind::Cancelled);
-        let (tlas, order) = tlas::build(self.arity, emitting.len(), &bounds, report).map_err(cancelled)?;
+        let (tlas, order) = tlas::build(self.arity, emitting.len(), &bounds, &progress)?;
         let leaves = parallel::collect(order.len(), |leaf| emitting[order[leaf] as usize]);
         let lights = collection.into_lights(self.illumination, &leaves);
         let mut sampler = LightSampler { tlas, lights, environment, cost: 1.0, cost_at_build: 1.0 };
         sampler.fit();
         sampler.cost_at_build = sampler.cost;
-        match report.map(|report| report(1.0)) {
-            Some(ControlFlow::Break(())) => Err(Error(ErrorKind::Cancelled)),
-            Some(ControlFlow::Continue(())) | None => Ok(sampler),
-        }
+        progress.finish()?;
+        Ok(sampler)
     }
 }

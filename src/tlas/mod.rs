@@ -13,7 +13,7 @@ mod validate;
 mod walk;
 
 pub use arity::Arity;
-pub(crate) use build::{Report, build};
+pub(crate) use build::build;
 pub(crate) use tree::{MAX_LEAVES, Tlas, TlasView};
 pub use walk::Splitting;
 pub(crate) use walk::{Beam, Descent, FirstWeights, INTERLEAVED, LeafOracle, Outgoing};

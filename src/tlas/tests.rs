@@ -11,6 +11,7 @@ use super::walk::ray::{Crossed, Met};
 use super::{Arity, LeafOracle, Splitting, Tlas, TlasView};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
+use crate::progress::Progress;
 use crate::receiver::ShadingPoint;
 use crate::simd::InstructionSet;
 use crate::testing::Pcg32;
@@ -21,7 +22,8 @@ type Light = (LightBounds, Moments);
 /// The tree over lights, and the lights in the order of its leaves.
 pub(super) fn build(arity: Arity, lights: &[Light]) -> (Tlas, Vec<u32>) {
     let (mut tlas, order) =
-        super::build(arity, lights.len(), &|light| lights[light as usize].0, None).expect("nobody cancels");
+        super::build(arity, lights.len(), &|light| lights[light as usize].0, &Progress::new(None, 1.0))
+            .expect("nobody cancels");
     tlas.fit(&|leaf| lights[order[leaf as usize] as usize]);
     (tlas, order)
 }

@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use crate::common::pcg::Pcg32;
 use crate::common::tier::tier;
-use fanlight::{Arity, LightSampler, LightSamplerBuilder, Mesh};
-use glam::Vec3;
+use fanlight::{Arity, Environment, EnvironmentImage, LightSampler, LightSamplerBuilder, Mesh, Texture, Weight};
+use glam::{Vec2, Vec3};
 
 /// How many times as long as a build of as many triangles at random one of any others may take. One that compares all
 /// pairs takes hours.
@@ -131,4 +131,88 @@ fn a_build_can_be_cancelled() {
     }
     let nothing = LightSampler::builder().arity(Arity::Eight).build_with(|_| ControlFlow::Break(()));
     assert!(nothing.is_err_and(|error| error.is_cancelled()));
+}
+
+/// Many triangles, each with coordinates of its own, over a small image, whose memory does not suffice for all, and over
+/// a large one.
+fn textured<'a>(small: &'a [f32], large: &'a [f32]) -> LightSamplerBuilder<'a> {
+    let mut builder = LightSampler::builder();
+    let images = [Texture::new(16, 16, small), Texture::new(256, 256, large)].map(|t| t.expect("texels are finite"));
+    let images = images.map(|image| builder.add_texture(image));
+    let mut pcg = Pcg32::new(3, 41);
+    for i in 0..300 {
+        let uvs: Vec<Vec2> = (0..3).map(|_| Vec2::new(pcg.f32(), pcg.f32())).collect();
+        let positions: Vec<Vec3> = uvs.iter().map(|uv| uv.extend(i as f32)).collect();
+        let weight = Weight::Texture(images[usize::from(i % 7 == 0)]);
+        builder.add_mesh(&Mesh::portal(&positions, &[[0, 1, 2]]).uvs(&uvs).weight(weight)).expect("the mesh is valid");
+    }
+    builder
+}
+
+fn noise(count: usize) -> Vec<f32> {
+    let mut pcg = Pcg32::new(4, 41);
+    (0..count).map(|_| pcg.f32().powi(4)).collect()
+}
+
+#[cfg(feature = "rayon")]
+#[test]
+fn the_number_of_threads_changes_no_tree_over_an_image() {
+    let (small, large) = (noise(256), noise(1 << 16));
+    let bytes = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+        pool.install(|| textured(&small, &large).build().expect("there are not too many triangles").to_bytes())
+    };
+    let one = bytes(1);
+    for threads in [2, 7] {
+        assert!(bytes(threads) == one, "{threads} threads");
+    }
+}
+
+#[test]
+fn trees_over_images_are_part_of_the_progress() {
+    let (small, large) = (noise(256), noise(1 << 16));
+    let reports = Mutex::new(Vec::new());
+    let report = |share: f32| {
+        reports.lock().expect("no report panics").push(share);
+        ControlFlow::Continue(())
+    };
+    textured(&small, &large).build_with(report).expect("there are not too many triangles");
+    let mut reports = reports.into_inner().expect("no report panics");
+    assert_eq!(reports.last(), Some(&1.0));
+    reports.sort_by(f32::total_cmp);
+    let largest_step = reports.windows(2).map(|pair| pair[1] - pair[0]).fold(reports[0], f32::max);
+    assert!(largest_step < 0.1, "{reports:?}");
+    let cancelled = textured(&small, &large)
+        .build_with(|share| if share > 0.3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) });
+    assert!(cancelled.is_err_and(|error| error.is_cancelled()));
+}
+
+#[test]
+fn environments_report_progress_and_can_be_cancelled() {
+    let luminance = noise(256 * 128);
+    let image = EnvironmentImage::lat_long(256, 128, &luminance);
+    let reports = Mutex::new(Vec::new());
+    let report = |share: f32| {
+        reports.lock().expect("no report panics").push(share);
+        ControlFlow::Continue(())
+    };
+    let environment = Environment::new_with(&image, report).expect("texels are finite");
+    let mut reports = reports.into_inner().expect("no report panics");
+    assert_eq!(reports.last(), Some(&1.0));
+    reports.sort_by(f32::total_cmp);
+    let largest_step = reports.windows(2).map(|pair| pair[1] - pair[0]).fold(reports[0], f32::max);
+    assert!(largest_step < 0.1, "{reports:?}");
+    // Whoever looks on changes nothing.
+    let alone = Environment::new(&image).expect("texels are finite");
+    assert_eq!(environment.mean().to_bits(), alone.mean().to_bits());
+    for calls in [1, 100, 1000] {
+        let called = AtomicUsize::new(0);
+        let report = |share| {
+            let number = called.fetch_add(1, Ordering::Relaxed) + 1;
+            if number >= calls || share == 1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        assert!(Environment::new_with(&image, report).is_err_and(|error| error.is_cancelled()));
+        assert!(called.into_inner() < calls + 64);
+    }
+    assert!(Environment::new_with(&image, |_| ControlFlow::Break(())).is_err_and(|error| error.is_cancelled()));
 }

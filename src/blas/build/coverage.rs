@@ -4,9 +4,10 @@ use crate::blas::build::footprint::TexelFootprint;
 use crate::blas::build::pyramid::TexturePyramid;
 use crate::blas::build::texture::wrap_index;
 use crate::blas::build::touched::TexelRange;
+use crate::blas::build::window::{LargeWindow, SmallWindow, Window};
 use crate::blas::node::storable;
-use crate::geometry::{self, subdivision_centers};
-use crate::math::floor64;
+use crate::geometry::subdivision_centers;
+use crate::math::floor_to_i64;
 use crate::record::Filter;
 
 /// A positive average is at least this share of the brightest texel that is touched.
@@ -33,17 +34,22 @@ const IMAGE_SUBDIVISION: u32 = 8;
 /// *Proved*: there, areas have 22 of their 53 bits left. Larger would look up what can be integrated.
 const LINE_AREA: f64 = 1e-9;
 
-/// A footprint, or the part of one in a square of texels. A triangle cut by four lines has at most seven vertices;
-/// rounding could add one at each cut.
-type FootprintPolygon = geometry::Polygon<f64, 12>;
+/// Distance of the two points of Gauss's rule from the middle of an interval from -1 to 1. *Proved*: 1/√3.
+const GAUSS: f64 = 0.577_350_269_189_625_8;
 
 /// The average over a footprint in which lookups lie in `range`, from 0 to
-/// [`MAX_AVERAGE`](crate::blas::node::MAX_AVERAGE).
+/// [`MAX_AVERAGE`](crate::blas::node::MAX_AVERAGE). `window` is the footprint's
+/// [`window`](crate::blas::build::touched::window).
 ///
 /// It is zero exactly where the whole touched range is black. Otherwise it is a normal number between the range's
 /// ends, and exact (up to rounding, and up to a floor of a millionth of the brightest texel) for footprints of up to
 /// about 48 texels.
-pub(crate) fn average(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, range: TexelRange) -> f32 {
+pub(super) fn average(
+    pyramid: &TexturePyramid<'_>,
+    footprint: &TexelFootprint,
+    range: TexelRange,
+    window: Option<&SmallWindow>,
+) -> f32 {
     if range.is_constant() {
         return storable(f64::from(range.max));
     }
@@ -57,10 +63,7 @@ pub(crate) fn average(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint, 
     } else if texels(footprint) > EXACT_TEXELS {
         blocks(pyramid, footprint)
     } else {
-        match pyramid.texture().filtering() {
-            Filter::Nearest => nearest(pyramid, footprint),
-            Filter::Bilinear => bilinear(pyramid, footprint),
-        }
+        exact(pyramid, footprint, range.max, window)
     };
     let (min, max) = (f64::from(range.min), f64::from(range.max));
     // NaN, from a footprint that lost its area to rounding, becomes the floor here.
@@ -73,98 +76,139 @@ fn texels(footprint: &TexelFootprint) -> f64 {
     0.5 * footprint.double_area() + 2.0 * side
 }
 
-/// Splits the polygon by unit squares and visits each piece with its square's corner.
-fn squares(polygon: FootprintPolygon, mut each: impl FnMut([f64; 2], &FootprintPolygon)) {
-    let span = |polygon: &FootprintPolygon, k: usize| {
-        let (lo, hi) = extent(polygon, k);
-        // An empty polygon spans nothing.
-        if lo <= hi { (floor64(lo) as i64, floor64(hi) as i64) } else { (0, -1) }
-    };
-    let (y0, y1) = span(&polygon, 1);
-    for y in y0..=y1 {
-        let row = strip(&polygon, 1, y as f64, (y + 1) as f64);
-        let (x0, x1) = span(&row, 0);
-        for x in x0..=x1 {
-            each([x as f64, y as f64], &strip(&row, 0, x as f64, (x + 1) as f64));
-        }
+/// The mean over a footprint of up to about [`EXACT_TEXELS`].
+fn exact(
+    pyramid: &TexturePyramid<'_>,
+    footprint: &TexelFootprint,
+    brightest: f32,
+    window: Option<&SmallWindow>,
+) -> f64 {
+    let texture = pyramid.texture();
+    let is_nearest = texture.filtering() == Filter::Nearest;
+    if let Some(window) = window {
+        return if is_nearest {
+            integrated::<_, true>(window, footprint, brightest)
+        } else {
+            integrated::<_, false>(window, footprint, brightest)
+        };
+    }
+    let margin = if is_nearest { 0.0 } else { 0.5 };
+    let ends = core::array::from_fn(|k| {
+        let end = |at: f64| footprint.origin[k] + floor_to_i64(at);
+        [end(footprint.lo[k] - margin), end(footprint.hi[k] + margin)]
+    });
+    match LargeWindow::new(texture, ends) {
+        Some(window) if is_nearest => integrated::<_, true>(&window, footprint, brightest),
+        Some(window) => integrated::<_, false>(&window, footprint, brightest),
+        None => looked_up(pyramid, footprint),
     }
 }
 
-/// Ends of a polygon along an axis.
-fn extent(polygon: &FootprintPolygon, axis: usize) -> (f64, f64) {
-    let ends = (f64::INFINITY, f64::NEG_INFINITY);
-    polygon.vertices().iter().fold(ends, |(lo, hi), v| (v[axis].min(lo), v[axis].max(hi)))
+/// A place of the grid between whose lines the image is a polynomial: the corner of a texel, or its center.
+#[derive(Clone, Copy, Default)]
+struct GridNode {
+    /// The integral along the row from the window's first node.
+    before: f64,
+    /// The image's value to the right of the node.
+    value: f64,
+    /// Half of what the image gains up to the next node.
+    half_gain: f64,
 }
 
-/// The part of a polygon between two parallels: `lo <= coordinate <= hi` along an axis.
-fn strip(polygon: &FootprintPolygon, axis: usize, lo: f64, hi: f64) -> FootprintPolygon {
-    let (min, max) = extent(polygon, axis);
-    let mut out = *polygon;
-    if min < lo {
-        out = out.clip_axis(axis, lo, 1.0);
+impl GridNode {
+    /// The integral along the row up to a place `x` behind the node.
+    #[inline(always)]
+    fn integral(&self, x: f64) -> f64 {
+        self.before + x * (self.value + x * self.half_gain)
     }
-    if max > hi {
-        out = out.clip_axis(axis, hi, -1.0);
-    }
-    out
 }
 
-/// Area, not negative.
-fn area(polygon: &FootprintPolygon) -> f64 {
-    polygon.fan().map(|(_, double)| 0.5 * double.abs()).sum()
-}
-
-/// Integrals of the four bilinear weights `(1-x)(1-y)`, `x(1-y)`, `(1-x)y`, `xy` of the unit square at `corner`, over
-/// a polygon inside of it.
+/// The mean over a footprint whose texels are in a window, by Green's theorem.
 ///
-/// The weights are quadratic, so that the rule of the three edge midpoints is exact on each triangle of a fan.
-fn bilinear_weights(polygon: &FootprintPolygon, corner: [f64; 2]) -> [f64; 4] {
-    let mut weights = [0.0; 4];
-    for ([a, b, c], double) in polygon.fan() {
-        let area = 0.5 * double.abs();
-        for (p, q) in [(a, b), (b, c), (c, a)] {
-            let x = 0.5 * (p[0] + q[0]) - corner[0];
-            let y = 0.5 * (p[1] + q[1]) - corner[1];
-            let third = area / 3.0;
-            weights[0] += third * (1.0 - x) * (1.0 - y);
-            weights[1] += third * x * (1.0 - y);
-            weights[2] += third * (1.0 - x) * y;
-            weights[3] += third * x * y;
+/// With `F(x, y)` the integral of the image along the row `y`, from the window's left edge to `x`, the integral over the
+/// footprint is that of `F dy` along its edges. Between grid lines `F` is a polynomial of at most third degree along an
+/// edge, so that two points of Gauss's rule integrate it exactly; with nearest lookup it is linear, and its middle does.
+///
+/// Texels above `brightest` are not touched. They count as that, so that what they add and subtract again is not larger
+/// than the result.
+fn integrated<const CAPACITY: usize, const NEAREST: bool>(
+    window: &Window<CAPACITY>,
+    footprint: &TexelFootprint,
+    brightest: f32,
+) -> f64 {
+    let shift = if NEAREST { 0.0 } else { 0.5 };
+    let offset: [f64; 2] = core::array::from_fn(|k| (footprint.origin[k] - window.first[k]) as f64 - shift);
+    let corners = footprint.corners.map(|corner| [corner[0] + offset[0], corner[1] + offset[1]]);
+    let [width, height] = window.size;
+    let mut nodes = [GridNode::default(); CAPACITY];
+    for (row, nodes) in nodes.chunks_exact_mut(width).take(height).enumerate() {
+        let texels = window.row(row);
+        let clamped = |texel: f32| f64::from(if texel < brightest { texel } else { brightest });
+        let (mut before, mut value) = (0.0, clamped(texels[0]));
+        for (column, node) in nodes.iter_mut().enumerate() {
+            let next = clamped(texels[(column + 1).min(width - 1)]);
+            let half_gain = if NEAREST { 0.0 } else { 0.5 * (next - value) };
+            *node = GridNode { before, value, half_gain };
+            before += value + half_gain;
+            value = next;
         }
     }
-    // Rounding at the rim could leave a weight just below zero.
-    weights.map(|w| w.max(0.0))
+    // Rounding could take a corner across the window's rim; polynomials hold a little beyond their square, too.
+    let last = [width, height].map(|n| n.saturating_sub(if NEAREST { 1 } else { 2 }) as i64);
+    let mut sum = 0.0;
+    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+        for_each_piece(corners[from], corners[to], |[column, row], p, q| {
+            let [column, row] = [column.clamp(0, last[0]), row.clamp(0, last[1])];
+            let at = row as usize * width + column as usize;
+            let (x, y) = (0.5 * (p[0] + q[0]) - column as f64, 0.5 * (p[1] + q[1]) - row as f64);
+            let mean = if NEAREST {
+                nodes[at].integral(x)
+            } else {
+                // The next row is in the window, which holds what bilinear lookup touches.
+                let (above, below) = (&nodes[at], &nodes[(at + width).min(CAPACITY - 1)]);
+                let (dx, dy) = (0.5 * GAUSS * (q[0] - p[0]), 0.5 * GAUSS * (q[1] - p[1]));
+                let along = |x: f64, y: f64| (1.0 - y) * above.integral(x) + y * below.integral(x);
+                0.5 * (along(x - dx, y - dy) + along(x + dx, y + dy))
+            };
+            sum += (q[1] - p[1]) * mean;
+        });
+    }
+    let [a, b, c] = corners;
+    sum / (0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])))
 }
 
-/// Texels weighted by the area that the footprint covers of each.
-fn nearest(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
-    let texture = pyramid.texture();
-    let (mut sum, mut total) = (0.0, 0.0);
-    squares(FootprintPolygon::new(footprint.corners), |corner, piece| {
-        let covered = area(piece);
-        let [x, y] = core::array::from_fn(|k| footprint.origin[k] + corner[k] as i64);
-        sum += covered * f64::from(texture.fetch(x, y));
-        total += covered;
-    });
-    sum / total
-}
-
-/// The integral of the interpolated texture, one patch between four texel centers at a time.
-fn bilinear(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
-    let texture = pyramid.texture();
-    let (mut sum, mut total) = (0.0, 0.0);
-    // Patches have their corners at texel centers.
-    let shifted = footprint.corners.map(|[x, y]| [x - 0.5, y - 0.5]);
-    squares(FootprintPolygon::new(shifted), |corner, piece| {
-        let weights = bilinear_weights(piece, corner);
-        let [x, y]: [i64; 2] = core::array::from_fn(|k| footprint.origin[k] + corner[k] as i64);
-        let texels = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
-        for (weight, (i, j)) in weights.into_iter().zip(texels) {
-            sum += weight * f64::from(texture.fetch(i, j));
-            total += weight;
+/// Cuts an edge at the lines of the unit grid. Visits every piece that counts, with its square's corner.
+#[inline(always)]
+fn for_each_piece(from: [f64; 2], to: [f64; 2], mut visit: impl FnMut([i64; 2], [f64; 2], [f64; 2])) {
+    let delta = [to[0] - from[0], to[1] - from[1]];
+    if delta[1] == 0.0 {
+        return;
+    }
+    let mut square = from.map(floor_to_i64);
+    let last = to.map(floor_to_i64);
+    let inverse = delta.map(|delta| if delta == 0.0 { 0.0 } else { 1.0 / delta });
+    // Where along the edge the next line of each axis is crossed; never, after the last.
+    let crossing = |square: [i64; 2], k: usize| {
+        if square[k] == last[k] {
+            return f64::INFINITY;
         }
-    });
-    sum / total
+        let line = square[k] + i64::from(delta[k] > 0.0);
+        (line as f64 - from[k]) * inverse[k]
+    };
+    let mut next = [crossing(square, 0), crossing(square, 1)];
+    let mut start = from;
+    loop {
+        let k = usize::from(next[1] < next[0]);
+        if !(next[k] < 1.0) {
+            visit(square, start, to);
+            return;
+        }
+        let end = [from[0] + next[k] * delta[0], from[1] + next[k] * delta[1]];
+        visit(square, start, end);
+        start = end;
+        square[k] += if delta[k] > 0.0 { 1 } else { -1 };
+        next[k] = crossing(square, k);
+    }
 }
 
 /// The mean of lookups at the centers of cells, in a level of the pyramid whose blocks are about as large as these
@@ -178,7 +222,7 @@ fn blocks(pyramid: &TexturePyramid<'_>, footprint: &TexelFootprint) -> f64 {
         level += 1;
     }
     mean_of_centers(footprint, |[x, y]| {
-        let texel = |at: f64, k: usize| wrap_index(wrap[k], footprint.origin[k] + floor64(at) as i64, size[k]);
+        let texel = |at: f64, k: usize| wrap_index(wrap[k], footprint.origin[k] + floor_to_i64(at), size[k]);
         f64::from(pyramid.block(level, texel(x, 0) >> level, texel(y, 1) >> level).mean)
     })
 }

@@ -5,7 +5,7 @@ use glam::Vec2;
 use crate::blas::barycentric::{LATTICE, LatticeCell};
 use crate::blas::build::texture::Texture;
 use crate::error::{Error, ErrorKind};
-use crate::math::{floor64, sqrt64};
+use crate::math::{floor_to_i64, sqrt64};
 
 /// Texture coordinates may be this large. *Proved*: up to here texel indices stay exact, and beyond it an `f32` cannot
 /// tell the texels of a larger image apart anyway.
@@ -79,12 +79,20 @@ impl UvTriangle {
     }
 }
 
+/// Ends along an axis of corners that are numbers. (`f64::min` would test for NaN.)
+#[inline(always)]
 fn bounds(corners: &[[f64; 2]; 3], k: usize) -> (f64, f64) {
-    let [a, b, c] = corners.map(|c| c[k]);
-    (a.min(b).min(c), a.max(b).max(c))
+    ends(corners.map(|c| c[k]))
 }
 
-/// A triangle in texels, ready to be tested against boxes.
+/// The least and the largest of three numbers.
+#[inline(always)]
+fn ends([a, b, c]: [f64; 3]) -> (f64, f64) {
+    let (low, high) = if a < b { (a, b) } else { (b, a) };
+    (if c < low { c } else { low }, if c > high { c } else { high })
+}
+
+/// A triangle in texels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TexelFootprint {
     /// An integer point near the triangle. All else counts from here, so that nothing is lost far from the origin.
@@ -97,23 +105,26 @@ pub(crate) struct TexelFootprint {
     pub(crate) hi: [f64; 2],
     /// See [`UvTriangle`].
     pub(crate) slack: [f64; 2],
-    /// The edges' normals, and what the triangle spans along each.
-    normals: [([f64; 2], [f64; 2]); 3],
 }
 
 impl TexelFootprint {
     fn new(corners: [[f64; 2]; 3], slack: [f64; 2]) -> Self {
-        let origin = core::array::from_fn(|k| floor64(bounds(&corners, k).0) as i64);
+        let origin = core::array::from_fn(|k| floor_to_i64(bounds(&corners, k).0));
         let corners = corners.map(|c| [c[0] - origin[0] as f64, c[1] - origin[1] as f64]);
         let (x, y) = (bounds(&corners, 0), bounds(&corners, 1));
-        let normals = core::array::from_fn(|k| {
+        Self { origin, corners, lo: [x.0, y.0], hi: [x.1, y.1], slack }
+    }
+
+    /// The edges' normals, each with what the triangle spans along it.
+    #[inline]
+    pub(crate) fn normals(&self) -> [EdgeNormal; 3] {
+        let corners = &self.corners;
+        core::array::from_fn(|k| {
             let (p, q, r) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
-            let n = [p[1] - q[1], q[0] - p[0]];
-            let along = |v: [f64; 2]| n[0] * v[0] + n[1] * v[1];
-            let (a, b, c) = (along(p), along(q), along(r));
-            (n, [a.min(b).min(c), a.max(b).max(c)])
-        });
-        Self { origin, corners, lo: [x.0, y.0], hi: [x.1, y.1], slack, normals }
+            let normal = [p[1] - q[1], q[0] - p[0]];
+            let (lo, hi) = ends([p, q, r].map(|v| normal[0] * v[0] + normal[1] * v[1]));
+            EdgeNormal { normal, lo, hi }
+        })
     }
 
     /// Twice the area.
@@ -121,15 +132,29 @@ impl TexelFootprint {
         let [a, b, c] = self.corners;
         ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs()
     }
+}
 
-    /// Whether the closed triangle meets a closed box. Works for triangles without area, too.
-    pub(crate) fn meets(&self, x: [f64; 2], y: [f64; 2]) -> bool {
+/// A normal of an edge of a triangle, and what the triangle spans along it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EdgeNormal {
+    /// Not of unit length.
+    pub(crate) normal: [f64; 2],
+    /// Low end of the triangle.
+    pub(crate) lo: f64,
+    /// High end of the triangle.
+    pub(crate) hi: f64,
+}
+
+impl TexelFootprint {
+    /// Whether the closed triangle, of which these are the normals, meets a closed box. Works for triangles without area,
+    /// too.
+    pub(crate) fn meets(&self, normals: &[EdgeNormal; 3], x: [f64; 2], y: [f64; 2]) -> bool {
         if self.lo[0] > x[1] || self.hi[0] < x[0] || self.lo[1] > y[1] || self.hi[1] < y[0] {
             return false;
         }
         let center = [0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1])];
         let half = [0.5 * (x[1] - x[0]), 0.5 * (y[1] - y[0])];
-        self.normals.iter().all(|(n, [lo, hi])| {
+        normals.iter().all(|EdgeNormal { normal: n, lo, hi }| {
             let at = n[0] * center[0] + n[1] * center[1];
             let reach = n[0].abs() * half[0] + n[1].abs() * half[1];
             at + reach >= *lo && at - reach <= *hi

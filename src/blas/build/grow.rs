@@ -18,11 +18,11 @@ pub(crate) trait WeightSource: Sync {
     /// What may be wrong with them.
     type Fault: Send;
 
-    /// Their ends over a cell. With `exact` false it is enough that a range which is not constant is found not to be.
-    fn range(&self, cell: LatticeCell, exact: bool) -> Result<TexelRange, Self::Fault>;
+    /// What they all are over a cell, if they are all the same.
+    fn constant(&self, cell: LatticeCell) -> Result<Option<f32>, Self::Fault>;
 
-    /// Their average over a cell of that range.
-    fn average(&self, cell: LatticeCell, range: TexelRange) -> Result<f32, Self::Fault>;
+    /// Their ends and their average over a cell.
+    fn measure(&self, cell: LatticeCell) -> Result<(TexelRange, f32), Self::Fault>;
 
     /// Their variance over a small cell, as a share of what two values at the ends of its range would have.
     fn spread(&self) -> f64;
@@ -52,6 +52,16 @@ pub(crate) struct GrownTree {
 }
 
 impl GrownTree {
+    /// One weight for the whole triangle.
+    pub(super) fn constant(average: f32) -> Self {
+        Self { average, averages: Vec::new(), divided: Vec::new() }
+    }
+
+    /// Number of nodes.
+    pub(super) fn nodes(&self) -> usize {
+        self.divided.len() / ARITY
+    }
+
     /// Adds the tree to the pool. Returns its root and the bytes that it takes.
     pub(super) fn store(&self, pool: &mut Vec<CellBlock>) -> Result<(Root, f64), Error> {
         if self.divided.is_empty() || self.average == 0.0 {
@@ -69,27 +79,34 @@ impl GrownTree {
 /// A cell of which it is not yet known whether it is divided.
 struct OpenCell {
     cell: LatticeCell,
-    range: TexelRange,
     /// Its place in the tree.
     at: usize,
+    /// What is known of a fine cell.
+    measured: Option<MeasuredCell>,
 }
 
 /// A cell that could be a leaf.
+#[derive(Clone, Copy)]
 struct MeasuredCell {
     average: f32,
     /// Estimate of what its contrast adds to the variance, for a cell of unit area.
     variance: f64,
 }
 
+/// What is found below a divided cell.
+#[derive(Clone, Copy)]
+enum FoundChild {
+    /// A cell over which lookups are all the same.
+    Constant(f32),
+    /// A cell that may be divided, measured if it is fine.
+    Open(Option<MeasuredCell>),
+}
+
 /// Grows the tree of a triangle in which lookups are not all the same. It has no nodes if none is worth it.
-pub(crate) fn grow<S: WeightSource>(
-    source: &S,
-    range: TexelRange,
-    limits: &GrowthLimits,
-) -> Result<GrownTree, S::Fault> {
+pub(crate) fn grow<S: WeightSource>(source: &S, limits: &GrowthLimits) -> Result<GrownTree, S::Fault> {
     // The whole triangle stands in front, as the only cell of a node before the first.
     let mut growing = TreeGrowth { source, averages: alloc::vec![0.0], divided: alloc::vec![false], mass: 0.0 };
-    let mut open = alloc::vec![OpenCell { cell: LatticeCell::whole(), range, at: 0 }];
+    let mut open = alloc::vec![OpenCell { cell: LatticeCell::whole(), at: 0, measured: None }];
     let (mut nodes, mut level, mut share) = (0, 0, 1.0);
     while !open.is_empty() {
         let room = if level == limits.deepest { 0 } else { limits.nodes - nodes };
@@ -114,11 +131,26 @@ struct TreeGrowth<'a, S> {
 impl<S: WeightSource> TreeGrowth<'_, S> {
     /// The relative variance of sampling by averages is the sum of variance over mean. Ends of the range bound the
     /// variance (Bhatia and Davis 2000); with two values, and that is what edges have, the bound is exact.
-    fn measure(&self, open: &OpenCell, is_exact: bool) -> Result<MeasuredCell, S::Fault> {
-        let range = if is_exact { open.range } else { self.source.range(open.cell, true)? };
-        let average = self.source.average(open.cell, range)?;
+    fn judge(&self, range: TexelRange, average: f32) -> MeasuredCell {
         let [min, max, mean] = [range.min, range.max, average].map(f64::from);
-        Ok(MeasuredCell { average, variance: self.source.spread() * (max - mean) * (mean - min) / mean })
+        MeasuredCell { average, variance: self.source.spread() * (max - mean) * (mean - min) / mean }
+    }
+
+    fn measure(&self, open: &OpenCell) -> Result<MeasuredCell, S::Fault> {
+        match open.measured {
+            Some(measured) => Ok(measured),
+            None => self.source.measure(open.cell).map(|(range, average)| self.judge(range, average)),
+        }
+    }
+
+    /// What a cell is found to be.
+    fn child(&self, cell: LatticeCell, is_fine: bool) -> Result<FoundChild, S::Fault> {
+        if !is_fine {
+            return Ok(self.source.constant(cell)?.map_or(FoundChild::Open(None), FoundChild::Constant));
+        }
+        let (range, average) = self.source.measure(cell)?;
+        let open = || FoundChild::Open(Some(self.judge(range, average)));
+        Ok(if range.is_constant() { FoundChild::Constant(range.max) } else { open() })
     }
 
     /// The cells that are to be divided, in their order; the others become leaves. Of fine cells those may stay that
@@ -133,20 +165,31 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
         if spare.is_none() && open.len() <= room {
             return Ok(open);
         }
-        let measured = parallel::map(&open, WORTHWHILE_CELLS, |open| self.measure(open, spare.is_some()))?;
+        let measured = parallel::map(&open, WORTHWHILE_CELLS, |open| self.measure(open))?;
         let mass = self.mass + share * measured.iter().map(|m| f64::from(m.average)).sum::<f64>();
-        let mut ranks: Vec<(f64, usize)> = measured.iter().map(|m| m.variance).zip(0..).collect();
-        ranks.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        // Without contrast enough, they stay undivided from the end.
-        let mut left = 0.0;
-        let enough = |(variance, _): &&(f64, usize)| {
-            left += share * variance;
-            spare.is_some_and(|spare| left <= spare * mass)
+        let mut ranks: Vec<(f64, u32)> = measured.iter().map(|m| m.variance).zip(0..).collect();
+        let by_variance = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+        let count = match spare {
+            // The order of the others does not matter.
+            None => {
+                ranks.select_nth_unstable_by(room, by_variance);
+                room
+            }
+            Some(spare) => {
+                ranks.sort_unstable_by(by_variance);
+                // Without contrast enough, they stay undivided from the end.
+                let mut left = 0.0;
+                let enough = |(variance, _): &&(f64, u32)| {
+                    left += share * variance;
+                    left <= spare * mass
+                };
+                let spared = ranks.iter().rev().take_while(enough).count();
+                room.min(ranks.len() - spared)
+            }
         };
-        let spared = ranks.iter().rev().take_while(enough).count();
         let mut is_kept = alloc::vec![false; open.len()];
-        for &(_, i) in ranks[..ranks.len() - spared].iter().take(room) {
-            is_kept[i] = true;
+        for &(_, i) in &ranks[..count] {
+            is_kept[i as usize] = true;
         }
         for ((open, measured), _) in open.iter().zip(&measured).zip(&is_kept).filter(|(_, is_kept)| !**is_kept) {
             self.set(open.at, measured.average, share);
@@ -155,26 +198,24 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
     }
 
     /// Adds the nodes below cells. Returns those of their cells over which lookups differ.
-    fn divide(&mut self, open: Vec<OpenCell>, exact: bool, share: f64) -> Result<Vec<OpenCell>, S::Fault> {
-        let children: Vec<[(LatticeCell, TexelRange); ARITY]> = parallel::map(&open, WORTHWHILE_CELLS, |open| {
-            let mut children = [(open.cell, open.range); ARITY];
-            for (slot, (cell, range)) in children.iter_mut().enumerate() {
-                *cell = open.cell.child(slot);
-                *range = self.source.range(*cell, exact)?;
+    fn divide(&mut self, open: Vec<OpenCell>, is_fine: bool, share: f64) -> Result<Vec<OpenCell>, S::Fault> {
+        let children: Vec<[FoundChild; ARITY]> = parallel::map(&open, WORTHWHILE_CELLS, |open| {
+            let mut children = [FoundChild::Open(None); ARITY];
+            for (slot, child) in children.iter_mut().enumerate() {
+                *child = self.child(open.cell.child(slot), is_fine)?;
             }
             Ok(children)
         })?;
         let mut next = Vec::new();
         for (parent, children) in open.iter().zip(children) {
             self.divided[parent.at] = true;
-            for (cell, range) in children {
+            for (slot, child) in children.into_iter().enumerate() {
                 let at = self.averages.len();
                 self.averages.push(0.0);
                 self.divided.push(false);
-                if range.is_constant() {
-                    self.set(at, storable(f64::from(range.max)), share);
-                } else {
-                    next.push(OpenCell { cell, range, at });
+                match child {
+                    FoundChild::Constant(value) => self.set(at, storable(f64::from(value)), share),
+                    FoundChild::Open(measured) => next.push(OpenCell { cell: parent.cell.child(slot), at, measured }),
                 }
             }
         }

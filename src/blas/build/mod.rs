@@ -13,10 +13,14 @@ mod procedural;
 mod pyramid;
 mod texture;
 mod touched;
+mod window;
 
 pub(crate) use footprint::check_uv;
+#[cfg(test)]
 pub(crate) use image::build;
+pub(crate) use image::{ImageTree, build_images, image_work};
 pub use procedural::Procedural;
 pub(crate) use procedural::{RegisteredFunction, build_procedural};
+#[cfg(test)]
 pub(crate) use pyramid::TexturePyramid;
 pub use texture::Texture;

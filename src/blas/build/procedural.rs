@@ -137,7 +137,7 @@ pub(crate) fn build_procedural(
 ) -> Result<Root, Error> {
     let source = FunctionOnTriangle::new(function.function, uv);
     let fail = |fault: Fault| Error(fault.kind(mesh));
-    let range = source.range(LatticeCell::whole(), true).map_err(fail)?;
+    let range = source.range(LatticeCell::whole()).map_err(fail)?;
     if range.is_constant() {
         return Ok(Root::constant(storable(f64::from(range.max))));
     }
@@ -145,7 +145,7 @@ pub(crate) fn build_procedural(
     let blocks = ((most / size_of::<CellBlock>() as f64) as usize).max(1);
     let deepest = MAX_HALVINGS / LEVEL_HALVINGS;
     let limits = GrowthLimits { nodes: blocks * BLOCK_CELLS / ARITY, fine: 0, deepest, variance: FUNCTION_VARIANCE };
-    let tree = grow(&source, range, &limits).map_err(fail)?;
+    let tree = grow(&source, &limits).map_err(fail)?;
     let (root, bytes) = tree.store(pool)?;
     function.extra -= (bytes - FUNCTION_OWN_BYTES).max(0.0).min(function.extra);
     Ok(root)
@@ -194,10 +194,9 @@ impl<'a> FunctionOnTriangle<'a> {
     }
 }
 
-impl WeightSource for FunctionOnTriangle<'_> {
-    type Fault = Fault;
-
-    fn range(&self, cell: LatticeCell, _: bool) -> Result<TexelRange, Fault> {
+impl FunctionOnTriangle<'_> {
+    /// What the function says that it lies between over a cell.
+    fn range(&self, cell: LatticeCell) -> Result<TexelRange, Fault> {
         let region = self.region(cell);
         let [min, max] = self.function.bounds(region[0], region[1]);
         // NaN fails every comparison.
@@ -226,6 +225,20 @@ impl WeightSource for FunctionOnTriangle<'_> {
         let mean = sum / f64::from(FUNCTION_SUBDIVISION * FUNCTION_SUBDIVISION);
         let [min, max] = [range.min, range.max].map(f64::from);
         Ok(storable(mean.max(FUNCTION_FLOOR * max).clamp(min, max)))
+    }
+}
+
+impl WeightSource for FunctionOnTriangle<'_> {
+    type Fault = Fault;
+
+    fn constant(&self, cell: LatticeCell) -> Result<Option<f32>, Fault> {
+        let range = self.range(cell)?;
+        Ok(range.is_constant().then_some(range.max))
+    }
+
+    fn measure(&self, cell: LatticeCell) -> Result<(TexelRange, f32), Fault> {
+        let range = self.range(cell)?;
+        Ok((range, self.average(cell, range)?))
     }
 
     /// Nothing is known of what lies between the ends.

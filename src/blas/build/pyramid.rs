@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::blas::build::texture::Texture;
+use crate::parallel::{self, WORTHWHILE};
 
 /// Bytes for edges between the few large texels of a small image. All its triangles share it: the first ones take what
 /// they need. A budget: images of fewer than 2^17 texels have sharper edges with more.
@@ -43,12 +44,16 @@ impl<'a> TexturePyramid<'a> {
         while size != [1, 1] {
             let below = pyramid.levels.len() as u32;
             let [w, h] = size.map(|n| n.div_ceil(2));
-            let mut blocks = Vec::with_capacity(w as usize * h as usize);
-            for y in 0..h {
-                for x in 0..w {
-                    blocks.push(pyramid.merge(below, x, y, size));
+            let mut blocks = alloc::vec![TexelBlock { min: 0.0, max: 0.0, mean: 0.0 }; w as usize * h as usize];
+            // Rows at once that are worth handing to another thread.
+            let rows = (WORTHWHILE / w as usize).max(1);
+            parallel::for_each_chunk(&mut blocks, rows * w as usize, |chunk, blocks| {
+                for (row, blocks) in blocks.chunks_exact_mut(w as usize).enumerate() {
+                    for (x, block) in (0..).zip(blocks) {
+                        *block = pyramid.merge(below, x, (chunk * rows + row) as u32, size);
+                    }
                 }
-            }
+            });
             size = [w, h];
             pyramid.levels.push(PyramidLevel { size, blocks });
         }

@@ -65,6 +65,11 @@ impl<'a> Texture<'a> {
         [self.width, self.height]
     }
 
+    /// Number of texels.
+    pub(crate) fn texels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
     /// How the host reads between texel centers.
     pub(crate) fn filtering(&self) -> Filter {
         self.filter
@@ -78,6 +83,11 @@ impl<'a> Texture<'a> {
     /// A texel of the image itself.
     pub(crate) fn texel(&self, x: u32, y: u32) -> f32 {
         self.texels[y as usize * self.width as usize + x as usize]
+    }
+
+    /// Successive texels of a row of the image itself.
+    pub(crate) fn run(&self, x: usize, y: usize, len: usize) -> &[f32] {
+        &self.texels[y * self.width as usize + x..][..len]
     }
 
     /// A texel of the wrapped plane.
@@ -109,9 +119,14 @@ impl<'a> Texture<'a> {
     }
 }
 
-/// The texel of an `n` texels long axis that an index outside of it stands for.
+/// The texel of an `n` texels long axis that an index inside or outside of it stands for.
+#[inline]
 pub(crate) fn wrap_index(wrap: Wrap, index: i64, n: u32) -> u32 {
     let n = i64::from(n);
+    // Most are inside, and divisions are slow.
+    if (0..n).contains(&index) {
+        return index as u32;
+    }
     let wrapped = match wrap {
         Wrap::Repeat => index.rem_euclid(n),
         Wrap::Mirror => {

@@ -136,7 +136,7 @@ fn environments_of_other_limits_load() {
         FeatureLimits { flux_share: 0.9, ..FeatureLimits::default() },
     ] {
         let image = EnvironmentImage::equal_area(64, &image).filter(Filter::Nearest);
-        let environment = Environment::with_limits(&image, &limits).unwrap();
+        let environment = Environment::with_limits(&image, &limits, None).unwrap();
         different += u32::from(environment != default);
         let view = checked(environment.as_view()).unwrap();
         let mut pcg = Pcg32::new(1, 7);

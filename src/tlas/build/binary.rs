@@ -3,8 +3,8 @@
 
 use super::bins::Extent;
 use super::cluster::Item;
-use super::progress::Progress;
 use crate::parallel::{self, WORTHWHILE};
+use crate::progress::Progress;
 
 /// Depth below which lights are split into equal halves, so that no input can make the tree deeper than this plus the
 /// logarithm of its size. A smaller depth would spoil good trees of very uneven scenes (balanced trees of 2^28 leaves

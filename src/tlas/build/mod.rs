@@ -8,7 +8,6 @@ mod collapse;
 mod encode;
 mod fit;
 mod forest;
-mod progress;
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -16,30 +15,27 @@ use alloc::vec::Vec;
 use binary::{BinaryNode, subdivide};
 use cluster::Item;
 use collapse::collapse;
-use progress::{Cancelled, Progress};
-
-pub(crate) use progress::Report;
 
 use crate::bounds::LightBounds;
 use crate::parallel;
+use crate::progress::{Cancelled, Progress};
 use crate::tlas::arity::Arity;
 use crate::tlas::tree::Tlas;
 
 /// Arranges `count` lights, of which `light` tells the bounds, in a tree. Returns it with the lights in the order of its
-/// leaves; its nodes know no bounds until [`Tlas::fit`].
+/// leaves; its nodes know no bounds until [`Tlas::fit`]. Every light that has found its place is a unit of progress.
 pub(crate) fn build(
     arity: Arity,
     count: usize,
     light: &(impl Fn(u32) -> LightBounds + Sync),
-    report: Option<Report<'_>>,
+    progress: &Progress<'_>,
 ) -> Result<(Tlas, Vec<u32>), Cancelled> {
     if count == 0 {
         return Ok((Tlas::empty(arity), Vec::new()));
     }
-    let progress = Progress::new(report, count);
     let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
     let mut binary = vec![BinaryNode::default(); 2 * count - 1];
-    subdivide(&mut items, &mut binary, 0, &progress);
+    subdivide(&mut items, &mut binary, 0, progress);
     progress.check()?;
     drop(items);
     Ok(match arity {

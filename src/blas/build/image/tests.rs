@@ -240,3 +240,21 @@ fn edges_between_large_texels_are_followed() {
     }
     assert!(dark < 0.02 * lit, "{dark} {lit}");
 }
+
+/// Trees that are grown side by side are those of one after the other, also where the image's memory runs out.
+#[test]
+fn order_decides_who_gets_what_is_left() {
+    let mut rng = Pcg32::new(8, 8);
+    let texels: Vec<f32> = (0..256).map(|_| rng.next_f32()).collect();
+    let image = Texture::new(16, 16, &texels).unwrap().filter(Filter::Nearest);
+    let trees: Vec<ImageTree<'_>> =
+        (0..300).map(|_| ImageTree { image, texture: 3, uv: random_uv(&mut rng, 0.7) }).collect();
+    let mut together = Vec::new();
+    let roots = build_images(&trees, &mut together, &Progress::new(None, 1.0)).unwrap();
+    let (mut pyramid, mut alone) = (TexturePyramid::new(image), Vec::new());
+    for (tree, root) in trees.iter().zip(&roots) {
+        assert_eq!(build(&mut pyramid, tree.uv, &mut alone).unwrap(), *root);
+    }
+    assert_eq!(pyramid.extra, 0.0);
+    assert!(together == alone);
+}
