@@ -39,7 +39,7 @@ fn integral(
     // The more probable a triangle, the finer what may be missed in it.
     let least_depth = |pmf: f64| match pmf {
         pmf if pmf > 0.05 => 6,
-        pmf if pmf < 1e-3 && count >= 1000 => 2,
+        pmf if pmf < 1e-3 && count >= 10_000 => 2,
         _ => 4,
     };
     let probes = probes(scene, samples);

@@ -86,11 +86,7 @@ fn exact(
     let texture = pyramid.texture();
     let is_nearest = texture.filtering() == Filter::Nearest;
     if let Some(window) = window {
-        return if is_nearest {
-            integrated::<_, true>(window, footprint, brightest)
-        } else {
-            integrated::<_, false>(window, footprint, brightest)
-        };
+        return integrated(window, footprint, brightest, is_nearest);
     }
     let margin = if is_nearest { 0.0 } else { 0.5 };
     let ends = core::array::from_fn(|k| {
@@ -98,8 +94,7 @@ fn exact(
         [end(footprint.lo[k] - margin), end(footprint.hi[k] + margin)]
     });
     match LargeWindow::new(texture, ends) {
-        Some(window) if is_nearest => integrated::<_, true>(&window, footprint, brightest),
-        Some(window) => integrated::<_, false>(&window, footprint, brightest),
+        Some(window) => integrated(&window, footprint, brightest, is_nearest),
         None => looked_up(pyramid, footprint),
     }
 }
@@ -123,6 +118,20 @@ impl GridNode {
     }
 }
 
+/// The mean over a footprint whose texels are in a window.
+fn integrated<const CAPACITY: usize>(
+    window: &Window<CAPACITY>,
+    footprint: &TexelFootprint,
+    brightest: f32,
+    is_nearest: bool,
+) -> f64 {
+    if is_nearest {
+        integrated_along_edges::<CAPACITY, true>(window, footprint, brightest)
+    } else {
+        integrated_along_edges::<CAPACITY, false>(window, footprint, brightest)
+    }
+}
+
 /// The mean over a footprint whose texels are in a window, by Green's theorem.
 ///
 /// With `F(x, y)` the integral of the image along the row `y`, from the window's left edge to `x`, the integral over the
@@ -131,7 +140,7 @@ impl GridNode {
 ///
 /// Texels above `brightest` are not touched. They count as that, so that what they add and subtract again is not larger
 /// than the result.
-fn integrated<const CAPACITY: usize, const NEAREST: bool>(
+fn integrated_along_edges<const CAPACITY: usize, const NEAREST: bool>(
     window: &Window<CAPACITY>,
     footprint: &TexelFootprint,
     brightest: f32,
