@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::opening::{Coverage, Opening};
-use crate::blas::{self, ARITY, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
+use crate::blas::{self, ARITY, CHILD_CENTERS, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{EnvironmentView, FeatureNode};
 use crate::light::{LightViewKind, TriangleView};
 use crate::math;
@@ -22,6 +22,12 @@ const SMALL_CELL: f32 = 4.0;
 ///
 /// Larger: more cells are looked at closely. Smaller: a part of a feature could be missed.
 const ASIDE_ROUNDING: f32 = 1e-5;
+
+/// Rounding of squared distances from the feature's axis, relative to that from the shading point. Proved: a difference of
+/// two sums of three squares in `f32`, with an axis within 3e-7 of unit length, rounded up.
+///
+/// Larger and smaller as [`ASIDE_ROUNDING`].
+const SQUARE_ROUNDING: f32 = 3e-6;
 
 /// A part of a triangle through which a feature is visible.
 #[derive(Clone, Copy, Debug)]
@@ -81,7 +87,7 @@ impl<'a> FeatureView<'a> {
         scale: f32,
         found: &mut impl FnMut(FeaturePart, f32),
     ) {
-        if below.average == 0.0 || self.is_aside(&corners) {
+        if below.average == 0.0 {
             return;
         }
         let opening = self.opening(cell);
@@ -96,26 +102,33 @@ impl<'a> FeatureView<'a> {
             return;
         }
         if self.is_small(&corners) {
-            let through = scale * self.power_through(cell, below.node);
-            if through > 0.0 {
-                found(FeaturePart { cell, node: below.node, power: 0.0 }, through);
+            let average = scale * self.average_before_feature(&corners, below.node);
+            let power = opening.power(self.environment, self.node);
+            if power * average > 0.0 {
+                found(FeaturePart { cell, node: below.node, power }, power * average);
             }
             return;
         }
         let averages = blas::averages(self.triangle.cells, below.node);
-        for (i, average) in averages.into_iter().enumerate() {
+        let apart = self.are_apart(&corners);
+        for (i, average) in averages.into_iter().enumerate().filter(|(i, _)| !apart[*i]) {
             let root = Root { average: average * scale, node: blas::below(self.triangle.cells, below.node, i) };
             self.visit_below((cell.child(i), blas::child_corners(&corners, i)), root, scale, found);
         }
     }
 
-    /// Power of the feature through a cell, relative to what a texture of the relative average one would let through: as if
-    /// the textures of its children were constant.
-    fn power_through(&self, cell: LatticeCell, node: u32) -> f32 {
+    /// Mean of the relative averages of those children of a cell that the feature may be visible through.
+    fn average_before_feature(&self, corners: &[Vec3; 3], node: u32) -> f32 {
         let averages = blas::averages(self.triangle.cells, node);
-        let mut powers = [0.0; ARITY];
-        self.weigh_children(cell, &(), &averages, &mut powers);
-        averages.iter().zip(&powers).map(|(average, power)| average * power).sum()
+        let apart = self.are_apart(corners);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (average, apart) in averages.into_iter().zip(apart) {
+            if !apart {
+                sum += average;
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum / count } else { 0.0 }
     }
 
     /// Draws a point in a part.
@@ -155,21 +168,33 @@ impl<'a> FeatureView<'a> {
         &self.environment.feature_nodes()[self.node]
     }
 
-    /// Whether a cell is so far from the feature's axis that nothing of the feature is visible through it: a quick test
-    /// that decides about most cells of a node.
+    /// Which children of a cell are so far from the feature's axis that nothing of the feature is visible through them: a
+    /// quick test that decides about most.
     ///
-    /// The directions to the cell lie in a cone around that to its center. Where the sines of the radii of two cones add up
+    /// The directions to a child lie in a cone around that to its center. Where the sines of the radii of two cones add up
     /// to less than that of the angle between their axes, or than 1 for an obtuse angle, the cones are apart.
-    fn is_aside(&self, corners: &[Vec3; 3]) -> bool {
+    fn are_apart(&self, corners: &[Vec3; 3]) -> [bool; ARITY] {
         let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
         let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
         let extent = self.triangle.vertices().iter().fold(0.0, |extent: f32, v| extent.max(v.abs().max_element()));
-        let feature = self.bright();
-        let (axis, center) = (Vec3::from_array(feature.axis), self.environment.local_direction(center));
-        let distance = math::sqrt(center.length_squared());
-        let reach = math::sqrt(radius2) + feature.reach() * distance + ASIDE_ROUNDING * extent;
-        let across2 = if axis.dot(center) < 0.0 { f32::INFINITY } else { axis.cross(center).length_squared() };
-        reach < distance && reach * reach < across2
+        let radius = math::sqrt(radius2 * (1.0 / ARITY as f32)) + ASIDE_ROUNDING * extent;
+        let (axis, sine) = (Vec3::from_array(self.bright().axis), self.bright().reach());
+        let [v0, v1, v2] = corners.map(|corner| self.environment.local_direction(corner));
+        let (e1, e2) = (v1 - v0, v2 - v0);
+        let mut apart = [false; ARITY];
+        for (i, apart) in apart.iter_mut().enumerate() {
+            let (b1, b2) = (CHILD_CENTERS.b1[i], CHILD_CENTERS.b2[i]);
+            let x = v0.x + (e1.x * b1 + e2.x * b2);
+            let y = v0.y + (e1.y * b1 + e2.y * b2);
+            let z = v0.z + (e1.z * b1 + e2.z * b2);
+            let along = axis.x * x + axis.y * y + axis.z * z;
+            let distance2 = x * x + y * y + z * z;
+            let reach = radius + sine * math::sqrt(distance2);
+            let reach2 = reach * reach + SQUARE_ROUNDING * distance2;
+            let across2 = distance2 - if along > 0.0 { along * along } else { 0.0 };
+            *apart = reach2 < across2;
+        }
+        apart
     }
 
     /// Corners of a cell, relative to the shading point.
@@ -198,10 +223,8 @@ impl CellTarget for FeatureView<'_> {
     fn child(&self, (): &(), _index: usize) {}
 
     fn weigh_children(&self, at: LatticeCell, (): &(), averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
-        *weights = core::array::from_fn(|i| {
-            let child = at.child(i);
-            if averages[i] == 0.0 || self.is_aside(&self.corners(child)) { 0.0 } else { self.power(child) }
-        });
+        let apart = self.are_apart(&self.corners(at));
+        *weights = core::array::from_fn(|i| if averages[i] == 0.0 || apart[i] { 0.0 } else { self.power(at.child(i)) });
     }
 
     fn is_final(&self, _at: LatticeCell, (): &mut (), _levels: Option<u32>) -> bool {
