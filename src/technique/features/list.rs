@@ -58,7 +58,7 @@ impl VisibleFeatures {
 
     /// Forgets all but the first entries.
     #[inline]
-    fn truncate(&mut self, len: usize) {
+    pub(super) fn truncate(&mut self, len: usize) {
         self.visible.truncate(len);
         self.weights.truncate(len);
     }
