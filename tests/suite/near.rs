@@ -36,7 +36,7 @@ fn solid_angle(corners: &[DVec3]) -> f64 {
         let (p, q) = (b.cross(a), b.cross(c));
         p.cross(q).length().atan2(p.dot(q))
     };
-    (0..n).map(angle).sum::<f64>() - (n as f64 - 2.0) * std::f64::consts::PI
+    (0..n).map(angle).sum::<f64>() - (n as f64 - 2.0) * core::f64::consts::PI
 }
 
 /// Mean and mean square of estimates that are drawn at one point.

@@ -97,7 +97,7 @@ fn examine(lights: &LightSampler, scene: &Scene, x: &ShadingPoint, least_depth: 
     kept.truncate(2000);
     let probes = probes(scene, &kept);
     let pdf = |hit: &Hit| {
-        let factor = if wrong && hit.barycentrics[1] > 0.5 { 1.1 } else { 1.0 };
+        let factor = if wrong && hit.barycentrics[1] > 0.5 { 1.15 } else { 1.0 };
         factor * f64::from(lights.at(x).pdf(hit))
     };
     let mut expected = Vec::new();
@@ -144,7 +144,8 @@ fn samples_of_any_function_follow_the_density() {
 #[test]
 fn a_density_that_is_off_is_found() {
     let scene = light();
-    assert!(examine(&sampler(&scene, WAVES, Arity::Sixteen), &scene, &points()[0], 6, true).0 < 1e-9);
+    let (p, integral, _) = examine(&sampler(&scene, WAVES, Arity::Sixteen), &scene, &points()[0], 6, true);
+    assert!(p < 1e-9, "p = {p:e}, integral {integral}");
 }
 
 #[test]

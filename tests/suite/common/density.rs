@@ -1,17 +1,19 @@
 //! Integrals of a density over triangles, from the outside: nothing is known but values of `pdf` at points, and that
-//! either the density per area is constant over dyadic barycentric cells of a depth that is not known, or that per solid
-//! angle over cells of any shape.
+//! either the density per area is constant over dyadic barycentric cells of a depth that is not known, or that per
+//! solid angle over cells of any shape.
 
 use fanlight::{Hit, LightSample, MeshId, ShadingPoint, TriangleId};
 use glam::DVec3;
 
+use super::pcg::Pcg32;
 use super::scene::Scene;
 
 /// Cells are not divided further, unless a test asks for it. What is left is the difference between neighbours over
 /// 4^-13 of a triangle.
 const DEEPEST: u32 = 13;
 
-/// Cells whose integral is less in doubt are not divided either: edges of cells by solid angle, which cross all others.
+/// Where the density per solid angle is constant over cells, those whose integral is less in doubt are not divided either:
+/// edges of cells by solid angle cross all others, at any depth.
 const NEGLIGIBLE_DOUBT: f64 = 5e-7;
 
 /// Barycentric coordinates that every density is exact for are multiples of this.
@@ -50,6 +52,7 @@ pub(crate) struct OnTriangle<'a> {
     vertices: [DVec3; 3],
     /// Times the triangle's area, over the distance cubed: from solid angle to the unit of the triangle.
     height_area: f64,
+    is_by_angle: bool,
     deepest: u32,
     most: usize,
     enough: f64,
@@ -63,7 +66,9 @@ impl<'a> OnTriangle<'a> {
         let [a, b, c] = vertices;
         // |n·a| / |n| · |n| / 2.
         let height_area = 0.5 * (b - a).cross(c - a).dot(a).abs();
-        Self { id: id(triangle), vertices, height_area, deepest: DEEPEST, most: usize::MAX, enough: 0.0, pdf }
+        let (deepest, most, enough) = (DEEPEST, usize::MAX, 0.0);
+        let on = Self { id: id(triangle), vertices, height_area, is_by_angle: false, deepest, most, enough, pdf };
+        Self { is_by_angle: on.is_constant_by_angle(), ..on }
     }
 
     /// Divides cells so often if need be, but not more than so many of them, and none where all that is in doubt is
@@ -71,6 +76,21 @@ impl<'a> OnTriangle<'a> {
     /// standard error.
     pub(crate) fn limits(self, deepest: u32, most: usize, enough: f64) -> Self {
         Self { deepest, most, enough, ..self }
+    }
+
+    /// Whether neighboring points have the same density per solid angle rather than per area: a majority of pairs.
+    fn is_constant_by_angle(&self) -> bool {
+        let mut pcg = Pcg32::new(self.id.triangle.into(), 62);
+        let is_same = |a: f64, b: f64| (a - b).abs() <= 1e-5 * a.max(b);
+        let mut votes = 0;
+        for _ in 0..16 {
+            let [u, v] = [pcg.f32(), pcg.f32()].map(|u| 0.001 + 0.498 * f64::from(u));
+            let pair = [[u, v], [u + 1e-4, v + 5e-5]].map(|b| self.density(b));
+            let by_angle = is_same(pair[0].pdf, pair[1].pdf);
+            let by_area = is_same(pair[0].by_area(), pair[1].by_area());
+            votes += i32::from(by_angle) - i32::from(by_area);
+        }
+        votes > 0
     }
 
     /// The density at a point.

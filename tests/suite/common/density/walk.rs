@@ -149,7 +149,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             solid_angle: self.on.solid_angle(cell.corners, share),
         };
         let key = range.doubt(share);
-        let is_small = !self.on.is_limited() && key < NEGLIGIBLE_DOUBT;
+        let is_small = !self.on.is_limited() && self.on.is_by_angle && key < NEGLIGIBLE_DOUBT;
         if key == 0.0 || is_small || cell.depth >= self.on.deepest {
             self.settle(&cell, range, &values);
         } else {
