@@ -1,7 +1,7 @@
 //! The bright features in groups, as they are looked for at one shading point.
 
-use super::super::Viewpoint;
 use crate::receiver::ReceiverKind;
+use crate::technique::Viewpoint;
 
 /// Most groups. *Measured* on skies of many lamps.
 ///
