@@ -85,6 +85,8 @@ pub(crate) enum ErrorKind {
     Cancelled,
     /// A section of bytes of another version.
     SectionVersion { what: &'static str, found: u32, expected: u32 },
+    /// Bytes with trees of an arity that this build does not walk.
+    Arity { what: &'static str, found: u32, expected: &'static [u32] },
     /// Bytes that do not hold what they should.
     Bytes { what: &'static str, at: usize, found: u64, expected: u64 },
 }
@@ -153,6 +155,13 @@ impl fmt::Display for Error {
             ErrorKind::Cancelled => write!(f, "the build was cancelled"),
             ErrorKind::SectionVersion { what, found, expected } => {
                 write!(f, "bytes: section `{what}` has version {found}, but this build reads version {expected}")
+            }
+            ErrorKind::Arity { what, found, expected } => {
+                write!(f, "bytes: {what} has the arity {found}, but this build reads ")?;
+                for (i, arity) in expected.iter().enumerate() {
+                    write!(f, "{}{arity}", if i == 0 { "" } else { ", " })?;
+                }
+                Ok(())
             }
             ErrorKind::Bytes { what, at, found, expected } => {
                 write!(f, "bytes: {what} at {at} is {found:#x}, expected {expected:#x}")

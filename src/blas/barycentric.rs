@@ -7,9 +7,11 @@
 //! The order is Ogaki's: with [`ARITY`] `M`, `R = √M` and `βk = min(R - 1, ⌊(1 - bk) R⌋)`, the rank is
 //! `β0² + (β1 - β2) + β0`. Rows are counted from vertex 0; row `r` holds `2 r + 1` cells, upright and inverted ones
 //! alternating. `R` successive ranks are a group. The number of a cell is that of a lane, `member · R + group`, so that
-//! the sums of all groups are the sum of `R` vectors. An upright cell has the corners of the whole triangle in the same order; an inverted one is turned by
-//! half a circle, corner `k` lying across from the edge that would be edge `k`. In its own coordinates an inverted cell
-//! is a triangle like any other, so that the next level does not see the difference.
+//! the sums of all groups are the sum of `R` vectors.
+//!
+//! An upright cell has the corners of the whole triangle in the same order. An inverted one is turned by half a circle:
+//! its corner `k` lies across from the edge that would be edge `k`. In its own coordinates an inverted cell is a triangle
+//! like any other, so that the next level does not see the difference.
 
 use crate::warp::triangle::square_to_triangle;
 
@@ -26,8 +28,9 @@ pub(crate) const MAX_HALVINGS: u32 = 20;
 
 /// Cells of a node. *Format*: it decides on the layout of [`CellNode`](super::node::CellNode).
 ///
-/// *Measured* for 4, 16 and 64 on a quad with spots (docs/ACCURACY.md, "Wide steps"): fewer cells take fewer bytes and a
-/// little less time, at a multiple of the variance.
+/// Chosen: a step is one loop over the lanes of a few vectors (docs/ACCURACY.md, "Wide steps"). Larger: more cells are
+/// weighed and stored that hardly differ. Smaller: fewer bytes, but larger cells, whose weights follow distance, cosine and
+/// radiance less closely; 4 and 16 had a multiple of the variance on a quad with spots, in a little less time.
 pub(crate) const ARITY: usize = 64;
 
 /// Cells along one edge of a node.

@@ -7,18 +7,18 @@ use core::cmp::Ordering;
 use super::feature_texel::FeatureTexel;
 use super::features::Cluster;
 
-/// Relative variance within the blocks of a feature up to which they stay as they are. *Measured* on captured suns.
+/// Relative variance within the blocks of a feature up to which they stay as they are. Chosen on captured suns, not swept.
 ///
 /// Larger: fewer blocks. Smaller: more of them, and the variance at points that see the whole feature falls with it.
 const BLOCK_VARIANCE: f64 = 0.004;
 
-/// Largest radius of a block over that of the feature. *Measured* on the window's sun.
+/// Largest radius of a block over that of the feature. Chosen on the window's sun, not swept.
 ///
 /// Larger: where an opening cuts the feature, more of the block next to the edge is bent. Smaller: more blocks.
 const BLOCK_REACH: f32 = 0.3;
 
-/// Largest margin of a block over the radius of the feature, unless it is a single texel. *Measured* on the window's
-/// sun.
+/// Largest margin of a block over the radius of the feature, unless it is a single texel. Chosen on the window's sun, not
+/// swept.
 ///
 /// Larger: more directions that miss the opening at its edges. Smaller: more blocks.
 const BLOCK_MARGIN: f32 = 0.002;

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::feature_texel::FeatureTexel;
 
-/// Most blocks of a leaf. *Measured* by the bench `instructions`.
+/// Most blocks of a leaf. Chosen by the bench `instructions`, not swept.
 ///
 /// Larger: fewer nodes, and more blocks that are looked at one by one. Smaller: the reverse.
 const LEAF_BLOCKS: usize = 4;

@@ -10,14 +10,14 @@ use super::view::EnvironmentView;
 use crate::math::{self, at_least, at_most, only_if};
 use crate::warp::equal_area::{QUICK_ERROR, SPHERE, STRETCH};
 
-/// Share of the covering lookup in an estimate. *Measured* on skies with black patches and with lamps: 2 % to 25 % differ
-/// only where the contrast is large, and there the larger share has up to a third of the variance.
+/// Share of the covering lookup in an estimate. Chosen on skies with black patches and with lamps, from 2 % and 25 %: these
+/// differ only where the contrast is large, and there the larger share has down to a third of the variance.
 ///
 /// Larger: a coarser estimate. Smaller: more noise where the finer lookup misses something bright.
 const COVER_SHARE: f32 = 0.25;
 
-/// Ratio of the largest radiance to the mean from which on lookups are covered. A guess: the cap of bright features lies at
-/// 16, where covering gains nothing.
+/// Ratio of the largest radiance to the mean from which on lookups are covered. Chosen, not swept: twice the ratio at which
+/// bright features are capped, so that an image without other contrast is looked up once.
 ///
 /// Larger: more noise in images of high contrast. Smaller: images without need of it pay for the second lookup.
 const SMOOTH_CONTRAST: f32 = 32.0;
@@ -29,13 +29,14 @@ const INTEGER: f32 = 12_582_912.0;
 /// The low bits that hold the integer. *Proved*: indices of texels a side are below 2^14.
 const INTEGER_MASK: u32 = 0x3f_ffff;
 
-/// Texels of the image up to whose solid angle a region counts as constant. *Measured* together with the steps of the
-/// spherical grid.
+/// Texels of the image up to whose solid angle a region counts as constant. Chosen together with the steps of the spherical
+/// grid, not swept.
 ///
 /// Larger: the contrast between neighboring texels is not followed. Smaller: steps that divide single texels.
 const CONSTANT_TEXELS: f32 = 4.0;
 
-/// Half the side of the box that stands for a region, in sides of the square of its solid angle. *Measured*.
+/// Half the side of the box that stands for a region, in sides of the square of its solid angle. Chosen, not swept: the box
+/// has the solid angle of the region.
 ///
 /// Larger: more steps. Smaller: contrast beside the center is not seen.
 const BOX_HALF: f32 = 0.5;

@@ -24,19 +24,22 @@ const CONSTANT_GEOMETRY: f32 = 1.0 / 16.0;
 
 /// Ratio of the least to the largest cosine of the receiver in a cell from which the cosine is taken to be constant.
 ///
-/// Measured (docs/ACCURACY.md, "Even cosine"). A larger value divides further for less variance.
+/// Measured (docs/ACCURACY.md, "Constant cosine"). A larger value divides further for less variance.
 const CONSTANT_COSINE: f32 = 0.5;
 
 /// Share of the largest height over the receiver's plane below which a cell is not divided for its cosine.
 ///
-/// Measured (docs/ACCURACY.md, "Even cosine"). A smaller value divides cells that hardly contribute.
+/// Measured (docs/ACCURACY.md, "Constant cosine"). A smaller value divides cells that hardly contribute.
 const LOW_COSINE: f32 = 1.0 / 16.0;
 
-/// Levels below the texture at which a descent ends whatever is left: one more does not change the variance by a
-/// hundredth where the texture is constant. Below a texture the cells are smaller.
+/// Levels below the tree over the texture at which a descent ends whatever is left: without a tree, and with one, whose
+/// last cells are smaller.
 ///
-/// Measured on the window (docs/ACCURACY.md, "Wide steps"): with one level less the energy-weighted variance under clouds
-/// doubles.
+/// Chosen, not swept (docs/ACCURACY.md, "Wide steps"). Larger: each level is one more step next to the triangle and in front
+/// of small bright parts of the environment; on the window, a fourth changed the variance by less than a hundredth. Smaller:
+/// these are left to noise; with two, the window's energy-weighted variance under clouds doubled. Both were seen before
+/// triangles without a texture had a grid of their own. Now these come here only with another [`Illumination`], or with next
+/// to no solid angle.
 const MOST_LEVELS: [u32; 2] = [3, 2];
 
 /// Least weight of a cell that may send light. Proved: products with averages and radiances are made positive again, and
@@ -145,7 +148,8 @@ impl<'a> CellKernel<'a> {
                 let size = EnvironmentView::filter_size_of_lane(texels * (distance2 * distance), finest);
                 fine[i] = EnvironmentView::texel_in_level(point, size);
                 if COVERING {
-                    // asin(s) <= s + (π/2 - 1) s³, as its series has no other signs. From 1 on the size is 1 anyway.
+                    // asin(s) <= s + (π/2 - 1) s³ up to 1, as all terms of its series are positive. From 1 on the size
+                    // is 1 anyway.
                     let sine = radius * inverse;
                     let angle = sine + 0.570_8 * (sine * sine * sine);
                     cover[i] = EnvironmentView::texel_in_level(point, EnvironmentView::cover_size(angle, finest));

@@ -1,11 +1,11 @@
 //! Sampling a triangle without a texture by directions: a grid of cells of equal solid angle on what is visible of it.
 //!
 //! The part of the triangle above the receiver's horizon is one or two spherical triangles ([`VisiblePart`]). The equal-area
-//! map of the unit square to each ([`SphericalTriangle`](crate::warp::SphericalTriangle)) makes a grid of 8 x 8 cells, columns of which meet in one corner.
-//! Cells are chosen by solid angle times the receiver's weight and the environment's radiance in their central directions,
-//! all 64 weighed in one vector loop. The chosen cell is divided again in the same way while the environment varies over
-//! it, up to three times. So there is nothing of the geometry left that could vary but the receiver's weight within a cell:
-//! the density does not depend on how near the triangle is.
+//! map from the unit square to each ([`SphericalTriangle`](crate::warp::SphericalTriangle)) makes a grid of 8 x 8 cells,
+//! whose columns meet in one corner. (Two triangles share the columns of the first step.) Cells are chosen by solid angle
+//! times the receiver's weight and the environment's radiance in their central directions; one vector loop weighs all 64.
+//! While the environment varies over the chosen cell, it is divided again in the same way, in up to three steps in all. Of
+//! the geometry, only the receiver's weight varies within a cell: the density does not depend on how near the triangle is.
 //!
 //! Sampling and density share [`descend`](SphericalGrid::descend): a [`GridGuide`] draws the way or follows a point. A drawn
 //! direction is rounded to a point of the triangle's lattice, and the density is that of the rounded point.
@@ -29,10 +29,11 @@ const HALF: usize = SIDE / 2;
 /// Cells of a step. Lane `row * SIDE + column`: sums over the rows are sums of vectors.
 const LANES: usize = SIDE * SIDE;
 
-/// Most steps. *Measured* on the window under clouds: the third takes the energy-weighted variance from 0.065 to 0.033, for
-/// less than 1 % more time.
+/// Most steps. *Measured* on the window under clouds (docs/ACCURACY.md, "Wide steps"): the third takes the energy-weighted
+/// variance from 0.065 to 0.033, for less than 1 % more time.
 ///
-/// Larger: nothing more is gained. Smaller: small bright parts of the environment are missed.
+/// Larger: cells smaller than the texels of most environments. Smaller: small bright parts of the environment are left to
+/// noise.
 const MAX_STEPS: usize = 3;
 
 /// Bits of a coordinate of the unit square that cells are told by. *Proved*: three steps use 9 of them.
@@ -40,8 +41,8 @@ const MAX_STEPS: usize = 3;
 /// Larger than 32: coordinates would not fit. Smaller than 9: cells could not be told apart.
 const FIXED_BITS: u32 = 30;
 
-/// Least solid angle of a grid. *Measured* with slivers and specks of a triangle: below it, rounding moves directions
-/// between cells.
+/// Least solid angle of a grid. Chosen with slivers and specks of a triangle, not swept: far below it, rounding moves
+/// directions between cells.
 ///
 /// Larger: more of the small triangles are divided by area. Smaller: densities could be those of a neighboring cell.
 const LEAST_SOLID_ANGLE: f64 = 1e-6;

@@ -1,4 +1,4 @@
-//! A triangle as seen from a shading point: the target that its cells are chosen by.
+//! A triangle as seen from a shading point: how points of it are drawn, by cells or by directions, and their densities.
 
 use core::f32::consts::PI;
 
@@ -27,7 +27,7 @@ const FARTHEST_POINT: f32 = 1e15;
 const CLOSE_RATIO: f32 = 256.0;
 
 /// Ratio of the height over a triangle to its radius from which the lattice resolves directions: 8 units of the lattice.
-/// *Measured* on near-h.
+/// Chosen, not swept.
 ///
 /// Larger: directions are drawn uniformly, with a relative deviation of 0.58, where they could be drawn by weight. Smaller:
 /// rounding to the lattice would bias samples.

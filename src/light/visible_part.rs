@@ -39,7 +39,7 @@ impl VisiblePart {
         // The horizon cuts the edges from it at these shares of their lengths.
         let (s, t) = (h0 / (h0 - h1), h0 / (h0 - h2));
         let (p, q) = (v0 + (v1 - v0) * s, v0 + (v2 - v0) * t);
-        // Determinants of triangles in one plane are as their areas.
+        // Determinants of triangles in one plane are in proportion to their areas.
         if above[odd] {
             return SphericalTriangle::new([v0, p, q], determinant * s * t).map(Self::one);
         }

@@ -12,7 +12,7 @@ use super::lights::LightSamplerView;
 use crate::blas;
 use crate::buffers::{Section, Sections, write};
 use crate::env::EnvironmentView;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::light::{Illumination, LightsView};
 use crate::technique::LightScene;
 use crate::tlas::{Arity, TlasView};
@@ -71,10 +71,15 @@ impl<'a> LightSamplerView<'a> {
         let mut sections = Sections::new(bytes)?;
         let parameters: Parameters = sections.take_value(Parameters::TAG, Parameters::VERSION, "parameters")?;
         let Parameters { light_arity, texture_arity, illumination, energy, has_portals, .. } = parameters;
-        Error::unless_equal("arity of the trees over textures", texture_arity as usize, blas::ARITY)?;
+        if texture_arity as usize != blas::ARITY {
+            let expected = const { &[blas::ARITY as u32] };
+            return Err(Error(ErrorKind::Arity { what: "a tree over a texture", found: texture_arity, expected }));
+        }
         Error::unless_equal("mark of portals", (has_portals & !1) as usize, 0)?;
-        let arity = Arity::from_code(light_arity)
-            .ok_or_else(|| Error::bytes("arity of the tree over the lights", 0, light_arity, 16u64))?;
+        let arity = Arity::from_code(light_arity).ok_or_else(|| {
+            let expected = const { &[Arity::Four.code(), Arity::Eight.code(), Arity::Sixteen.code()] };
+            Error(ErrorKind::Arity { what: "the tree over the lights", found: light_arity, expected })
+        })?;
         let illumination =
             Illumination::from_u32(illumination).ok_or_else(|| Error::bytes("illumination", 0, illumination, 0u64))?;
         if !(0.0..f32::INFINITY).contains(&energy) {

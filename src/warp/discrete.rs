@@ -25,7 +25,7 @@ pub(crate) fn pmf(weights: &[f32], i: usize) -> f64 {
 /// products of shares could underflow.
 const LEAST_CHOICE_SHARE: f32 = 1e-12;
 
-/// Least and largest weight. *Proved*: a sum of 16 weights is a finite `f32`, and a quotient of two
+/// Least and largest weight. *Proved*: a sum of 64 weights is a finite `f32`, and a quotient of two
 /// sums is a normal `f64`.
 ///
 /// Wider: sums could overflow. Narrower: weights of very bright or very dark scenes become

@@ -234,16 +234,21 @@ fn parameters(words: &[u32]) -> usize {
     HEADER + ENTRY * words[4] as usize
 }
 
-/// The arity of bytes is the one that they were built with: it comes back, and bytes that say another are refused.
+/// Bytes hold the arities that they were built with: the one of the tree over lights comes back, and bytes that say
+/// another are refused. That of the trees over textures is the same in all bytes, whatever it is.
 #[test]
 fn bytes_of_other_arities() {
     let (scene, _) = full();
     let mut pcg = Pcg32::new(8, 28);
+    let mut texture_arities = Vec::new();
     for (arity, number) in [(Arity::Four, 4), (Arity::Eight, 8), (Arity::Sixteen, 16)] {
         let lights = build(&scene, arity);
         let words = aligned(&lights.to_bytes());
         let parameters = parameters(&words);
-        assert_eq!(words[parameters..parameters + 2], [number, 4]);
+        assert_eq!(words[parameters], number);
+        let texture_arity = words[parameters + 1];
+        assert!(texture_arity >= 4 && texture_arity.isqrt().pow(2) == texture_arity, "{texture_arity}");
+        texture_arities.push(texture_arity);
         let view = View::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
         for i in 0..100 {
             let (x, u) = (crate::common::scene::random_point(&mut pcg, i), pcg.cube());
@@ -258,10 +263,14 @@ fn bytes_of_other_arities() {
             assert_error("another arity", load(0, other), &["bytes", "expected"]);
         }
         for unknown in [0, 1, 5, 32, u32::MAX] {
-            assert_error("no arity", load(0, unknown), &["arity", "lights", &format!("{unknown:#x}")]);
+            assert_error("no arity", load(0, unknown), &["lights", &format!("arity {unknown},"), "4, 8, 16"]);
         }
-        assert_error("textures of 16", load(1, 16), &["arity", "textures", "0x10", "0x4"]);
+        for other in [0, 1, texture_arity / 4, texture_arity + 1, 4 * texture_arity, u32::MAX] {
+            let (found, expected) = (format!("arity {other},"), format!("reads {texture_arity}"));
+            assert_error("another arity of textures", load(1, other), &["texture", &found, &expected]);
+        }
     }
+    assert!(texture_arities.iter().all(|arity| *arity == texture_arities[0]), "{texture_arities:?}");
 }
 
 /// Whatever one flipped bit does, the bytes are refused, or sampling works on what they say.

@@ -15,8 +15,10 @@ const WORTHWHILE_CELLS: usize = 256;
 
 /// Relative variance of sampling inside a cell from which dividing it is worth memory beyond the usual.
 ///
-/// *Measured* on grid-10000 with a clip map of 400² texels, whose cells have 3, and on noise, whose cells have less than
-/// 1. Larger: sharp edges are left to noise. Smaller: noise takes twice the memory for little.
+/// Chosen between two cases, not swept: the cells of grid-10000's clip map of 400² texels have 3, and those of noise have
+/// less than 1.
+///
+/// Larger: sharp edges stay inside of cells, and samples miss the openings. Smaller: noise takes twice the memory for little.
 const WORTHWHILE_VARIANCE: f64 = 1.5;
 
 /// The weights over a triangle.
@@ -38,7 +40,8 @@ pub(crate) trait WeightSource: Sync {
 pub(crate) struct GrowthLimits {
     /// Most nodes; one at least.
     pub(crate) nodes: usize,
-    /// How many more there may be below cells that are not fine, in which sampling would be as bad as [`WORTHWHILE_VARIANCE`] says.
+    /// How many more there may be below cells that are not fine, if sampling inside of them has at least the relative
+    /// variance [`WORTHWHILE_VARIANCE`].
     pub(crate) worthwhile: usize,
     /// From this level on, cells are fine: there must be a reason to divide them.
     pub(crate) fine: u32,

@@ -32,10 +32,10 @@ const FINE_AREA: f64 = 1.0;
 const FINE_LENGTH: f64 = 1.5;
 
 /// How often a fine cell may be halved where its contrast is worth it: along sharp edges between texels, and where
-/// bilinear lookup blurs them.
+/// bilinear lookup blurs them. A level halves a cell three times, so that these are two levels and one.
 ///
-/// *Measured* (the same table). More makes cells along edges smaller and takes memory: with half of each a clip map has
-/// three times the variance, with twice the blurred one it takes seven times the memory.
+/// *Measured* (the same table) with levels of one halving. More makes cells along edges smaller and takes memory: with half
+/// of each a clip map had three times the variance, with twice the blurred one it took seven times the memory.
 const EXTRA_HALVINGS: [u32; 2] = [6, 2];
 
 /// What the contrast of fine cells that are not divided may add to the relative variance.
@@ -61,16 +61,17 @@ const TEXELS_OF_COPIES: f64 = (1 << 15) as f64;
 /// Bytes for one triangle, at most. A budget: it bounds what one large image can take.
 const IMAGE_TREE_BYTES: f64 = (1 << 22) as f64;
 
-/// How many shares of [`BYTES_PER_IMAGE`] a triangle may take at most, of what the triangles before have saved: where an
-/// image is detailed in a few places, most take next to nothing of theirs.
+/// How many shares of [`BYTES_PER_IMAGE`] a triangle may take at most, if triangles of earlier batches have saved theirs:
+/// where an image is detailed in a few places, most triangles take next to nothing.
 ///
-/// A budget. *Measured* on sphere-9-spots: with one share the variance is 1.8 times as large.
+/// A budget, chosen and not swept: with one share the variance of sphere-9-spots was 1.8 times as large. Larger: the first
+/// triangles with detail may take what later ones need. Smaller: detail is left inside of cells while memory is unused.
 const MOST_SHARES: f64 = 4.0;
 
-/// A triangle that covers fewer texels has no tree. One that covers as many may have a block, whatever it takes.
+/// A triangle that covers fewer texels has no tree. One that covers as many may have a node, whatever it takes.
 ///
 /// *Measured* (ACCURACY.md, "Constants of the trees over textures"): with twice the value a triangle over five texels
-/// of noise has nine times the variance; with less, fine meshes take a block of 40 bytes for every triangle.
+/// of noise has nine times the variance; with less, fine meshes take a node of 76 bytes for every triangle.
 const LEAST_TEXELS: f64 = 4.0;
 
 /// With fewer leaves than this for each copy of the image, a triangle is not divided: all averages would be nearly
@@ -125,8 +126,9 @@ fn units(texture: &Texture<'_>, uv: [Vec2; 3]) -> usize {
 /// Adds the BLAS of many triangles to the pool. `trees` are sorted by their textures. Returns their roots in the same
 /// order.
 ///
-/// A cell is divided until lookups in it are all the same, or until it has at most one texel's area and edges of at
-/// most 1.5 texels; beyond that, up to six times (twice with bilinear lookup), where an edge of the image runs through.
+/// A cell is divided until lookups in it are all the same, or until, to the nearest level, it has at most one texel's area
+/// and edges of at most 1.5 texels; beyond that, by up to two levels (one with bilinear lookup), where an edge of the image
+/// runs through.
 /// A triangle whose memory runs out divides the cells first that reduce the variance most; the others keep their
 /// average. There are two bytes for each texel that it can see (four where most samples would go astray), half a byte
 /// (for 2^15 texels at least) where it sees copies of them, more for images of fewer than 2^17 texels, and 4 MB in all

@@ -13,7 +13,7 @@ use crate::warp::{keep_positive, sum_wide, within_range};
 /// The smallest cell that can be divided, in lattice units.
 const SMALLEST_DIVISIBLE: u32 = LATTICE >> (MAX_HALVINGS - LEVEL_HALVINGS);
 
-/// Sums of the weights of successive cells, in the order of the numbering.
+/// Sum of the weights of each group, which is [`EDGE_CELLS`] cells of successive ranks.
 pub(crate) type GroupSums = [f32; EDGE_CELLS as usize];
 
 /// Descends from the whole triangle to a cell over which the density is constant. Returns it with its probability;

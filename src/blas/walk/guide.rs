@@ -12,7 +12,7 @@ pub(crate) trait Guide {
 
 /// Draws the way in proportion to the weights.
 ///
-/// One variate chooses a group of [`EDGE_CELLS`] successive children, the other a child of the group. Each cell stands
+/// One variate chooses a group of [`EDGE_CELLS`] children, the other a child of the group. Each cell stands
 /// for an upright rectangle of the unit square; where all weights are equal, for a square of a binary grid, so that the
 /// points of a net fall one to a cell.
 #[derive(Clone, Copy, Debug)]

@@ -1,21 +1,21 @@
 //! The bright features in groups, as they are looked for at one shading point.
 
-use super::super::Viewpoint;
 use crate::receiver::ReceiverKind;
+use crate::technique::Viewpoint;
 
-/// Most groups. *Measured* on skies of many lamps.
+/// Most groups. Chosen on skies of many lamps, not swept.
 ///
 /// Larger: wide groups become smaller ones, each of which costs a walk down the tree over the lights. Smaller: lamps far from
 /// each other share a group, and with it the cosine.
 pub(super) const MAX_GROUPS: usize = 32;
 
-/// Largest angular radius of a group of several features, as a sine, where there are few lights. *Measured* on skies of
-/// many lamps.
+/// Largest angular radius of a group of several features, as a sine, where there are few lights. Chosen on skies of many
+/// lamps, not swept.
 ///
 /// Larger: the cosine varies within a group. Smaller: more walks down the tree over the lights.
 const GROUP_RADIUS: f32 = 0.12;
 
-/// Most lights for which features share a group. *Measured* on windows and lattices.
+/// Most lights for which features share a group. Chosen on windows and lattices, not swept.
 ///
 /// Larger: each of many small openings is looked at for all features of a group. Smaller: more walks down the tree.
 const FEW_LIGHTS: usize = 16;

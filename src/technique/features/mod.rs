@@ -26,7 +26,8 @@ use list::{ANY_PORTAL, MAX_VISIBLE, VisibleFeature};
 use opening::{Coverage, Opening};
 use view::FeatureView;
 
-/// Most lights for which each is looked at for all features at once, without a walk down the tree. *Measured* on windows.
+/// Most lights for which each is looked at for all features at once, without a walk down the tree. Chosen on windows, not
+/// swept.
 ///
 /// Larger: lights are looked at that no feature is seen through. Smaller: walks that find the same few lights each time.
 const FEW_PORTALS: usize = 4;

@@ -1,6 +1,6 @@
-//! How much of one texel of a bright feature is visible through an opening.
+//! How much of one block of a bright feature's texels is visible through an opening.
 //!
-//! The equal-area map bends a texel's edges only a little. Here a texel is a parallelogram in the space of directions,
+//! The equal-area map bends the edges of a block, in short a texel, only a little. Here it is a parallelogram of directions,
 //! an opening is three planes through the viewer, and the visible part is a square cut by three lines, whose area is
 //! exact. The texel's margin, which bounds the distance between the map and the parallelogram, makes the cut square
 //! hold every visible direction.

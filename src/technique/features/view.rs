@@ -12,9 +12,11 @@ use crate::warp::Variate;
 /// Ratio of a cell's to a feature's angular radius up to which the cell counts as one part, however its texture
 /// varies.
 ///
-/// Measured on star and grid-100 (docs/ACCURACY.md, "Suns taken out"). Larger: fewer parts, so that a shading point is
-/// cheaper, but the texture inside a part is followed by the tree's descent alone. Smaller: more parts, up to the limit of
-/// the list.
+/// Chosen, not swept. A step makes cells an eighth as wide, so that the parts of a textured triangle are from half as wide as
+/// the feature to four times as wide. A part is weighed by the mean of those of its children, again an eighth as wide, that
+/// the feature may be visible through. Larger: fewer parts, so that a shading point costs less, but children as wide as the
+/// feature, whose mean says less of what it shines through. Smaller: up to 64 times as many parts, of which the list holds
+/// [`MAX_VISIBLE`](super::list::MAX_VISIBLE).
 const SMALL_CELL: f32 = 4.0;
 
 /// Rounding of a cell's corners relative to the largest coordinate of a vertex. Proved: a corner is a sum of three
@@ -73,7 +75,7 @@ impl<'a> FeatureView<'a> {
     }
 
     /// Passes every part of the triangle through which the feature is visible to `found`, with the power through the
-    /// part. A part has one opacity, or is small. `opening` is that of the whole triangle.
+    /// part times an estimate of its opacity. A part has one opacity, or is small. `opening` is that of the whole triangle.
     pub(super) fn visit(&self, opening: &Opening, mut found: impl FnMut(FeaturePart, f32)) {
         let TriangleView { root, cells, .. } = *self.triangle;
         let scale = if root.node == LEAF { 1.0 } else { root.average / blas::mean(cells, root.node) };

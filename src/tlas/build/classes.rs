@@ -10,12 +10,14 @@ use super::binary::partition;
 use super::cluster::Item;
 use crate::tlas::arity::Arity;
 
-/// Ratio of the largest diagonal to the smallest in a class. A larger one mixes lights of more sizes, a smaller one
-/// sets lights apart that would do well in one tree. Chosen, not swept; its effect is in docs/ACCURACY.md, "Choosing a
-/// triangle".
+/// Ratio of the largest diagonal to the smallest in a class. Chosen, not swept; the effect of classes is in
+/// docs/ACCURACY.md, "Choosing a triangle".
+///
+/// Larger: lights of more sizes share a tree. Smaller: lights are set apart that would do well in one tree.
 const CLASS_RATIO: f32 = 8.0;
-/// Largest number of classes. Lights below the smallest class belong to it. More classes leave fewer lanes of the root for
-/// each. Chosen: four classes span three orders of magnitude, and the last one all below.
+/// Most classes. Chosen, not swept: three span a factor of 512 or more, and the fourth holds all that is smaller.
+///
+/// Larger: fewer lanes of the root for each. Smaller: lights of more sizes share the last class.
 pub(super) const MOST_CLASSES: usize = 4;
 
 /// Sorts lights into classes, the largest lights first. Returns the number of lights in each class.

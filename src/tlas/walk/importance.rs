@@ -51,15 +51,17 @@ impl<O: LeafOracle> LeafOracle for &O {
     }
 }
 
-/// Cosine at the lights up to which a single triangle is asked for whether it is visible. *Proved*: covers the rounding
-/// of normals, at most √3 / 2 of 1 / 510. A larger one only asks more often.
+/// Cosine at the lights up to which a single triangle is asked whether it is visible. *Proved*: covers the rounding of
+/// normals, at most √3 / 2 of 1 / 510. A larger one only asks more often.
 const EDGE_COSINE: f32 = 3e-3;
-/// Radius of a child's ball, relative to the distance of its center, from which on the child is opened. A smaller one opens
-/// more and costs more, a larger one trusts the moments of clusters around the point. Chosen, not swept: with 1, the ball
-/// holds the point; its effect is in docs/ACCURACY.md, "Choosing a triangle".
+/// Radius of a child's ball, relative to the distance of its center, from which on the child is opened. Chosen, not swept:
+/// with 1, the ball holds the point. The effect of opening is in docs/ACCURACY.md, "Choosing a triangle".
+///
+/// Larger: the moments of clusters around the point are trusted. Smaller: more children are opened, which costs time.
 const OPENING: f32 = 1.0;
-/// Share of the largest weight below which a child is not opened for doubt alone. A smaller one opens more, so that fewer
-/// samples find nothing, and costs more. Chosen, not swept; its effect is in docs/ACCURACY.md, "Choosing a triangle".
+/// Share of the largest weight below which a child is not opened for doubt alone. Chosen, not swept.
+///
+/// Larger: more samples find nothing. Smaller: more children are opened, which costs time.
 const LEAST_DOUBTED_SHARE: f32 = 1.0 / 16.0;
 /// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
 const LEAST_DISTANCE2: f32 = 1e-30;
@@ -83,8 +85,8 @@ struct Estimates<const N: usize> {
     largest: u32,
     /// A set of bits: leaves of which the bounds do not decide whether they are visible.
     doubtful: u32,
-    /// Two sets of bits: children near the shading point, and those of which bounds and moments do not agree whether they
-    /// are visible.
+    /// Two sets of bits: children near the shading point, and those that are dark by their moments, at the receiver and at
+    /// the lights, though their bounds do not prove it.
     opened: [u32; 2],
 }
 
@@ -260,8 +262,8 @@ impl<const N: usize> Node<N> {
     }
 }
 
-/// Returns the expectation of `max(0, X)` for a normal variable of this mean and variance, within 4 % of the standard deviation:
-/// exact at a mean of zero and far from it.
+/// Returns the expectation of `max(0, X)` for a normal variable of this mean and variance, within 4 % of the standard
+/// deviation: exact at a mean of zero and far from it.
 #[inline(always)]
 pub(super) fn clamped_mean(mean: f32, variance: f32) -> f32 {
     0.5 * (mean + math::sqrt(mean * mean + core::f32::consts::FRAC_2_PI * variance))
