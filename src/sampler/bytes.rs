@@ -29,13 +29,15 @@ struct Parameters {
     energy: f32,
     has_portals: u32,
     padding: u32,
+    is_crossed_once: u32,
+    more_padding: u32,
 }
 
-const _: () = assert!(size_of::<Parameters>() == 24);
+const _: () = assert!(size_of::<Parameters>() == 32);
 
 impl Parameters {
     const TAG: [u8; 4] = *b"PARA";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
 }
 
 impl<'a> LightSamplerView<'a> {
@@ -51,6 +53,8 @@ impl<'a> LightSamplerView<'a> {
             energy: lights.energy,
             has_portals: lights.has_portals.into(),
             padding: 0,
+            is_crossed_once: lights.is_crossed_once.into(),
+            more_padding: 0,
         }];
         let mut sections = Vec::new();
         sections.push(Section::new(Parameters::TAG, Parameters::VERSION, &parameters));
@@ -70,12 +74,14 @@ impl<'a> LightSamplerView<'a> {
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut sections = Sections::new(bytes)?;
         let parameters: Parameters = sections.take_value(Parameters::TAG, Parameters::VERSION, "parameters")?;
-        let Parameters { light_arity, texture_arity, illumination, energy, has_portals, .. } = parameters;
+        let Parameters { light_arity, texture_arity, illumination, energy, has_portals, is_crossed_once, .. } =
+            parameters;
         if texture_arity as usize != blas::ARITY {
             let expected = const { &[blas::ARITY as u32] };
             return Err(Error(ErrorKind::Arity { what: "a tree over a texture", found: texture_arity, expected }));
         }
         Error::unless_equal("mark of portals", (has_portals & !1) as usize, 0)?;
+        Error::unless_equal("mark of single crossings", (is_crossed_once & !1) as usize, 0)?;
         let arity = Arity::from_code(light_arity).ok_or_else(|| {
             let expected = const { &[Arity::Four.code(), Arity::Eight.code(), Arity::Sixteen.code()] };
             Error(ErrorKind::Arity { what: "the tree over the lights", found: light_arity, expected })
@@ -86,7 +92,8 @@ impl<'a> LightSamplerView<'a> {
             return Err(Error::bytes("energy", 0, energy.to_bits(), 0u64));
         }
         let tlas = TlasView::from_sections(&mut sections, arity)?;
-        let lights = LightsView::from_sections(&mut sections, illumination, energy, has_portals != 0)?;
+        let lights =
+            LightsView::from_sections(&mut sections, illumination, energy, has_portals != 0, is_crossed_once != 0)?;
         let environment = EnvironmentView::from_all_sections(&mut sections)?;
         sections.end()?;
         tlas.validate()?;
