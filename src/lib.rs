@@ -26,7 +26,8 @@
 //! let sample = here.sample([0.2, 0.7, 0.4]).expect("the lamp is above the floor");
 //! assert!(sample.position.y > -1e-3);
 //! // The same density, if a ray had hit the lamp by chance.
-//! assert!((here.pdf(&sample.hit) / sample.pdf - 1.0).abs() < 1e-5);
+//! let hit = sample.hit().expect("the lamp is a triangle");
+//! assert!((here.pdf(&hit) / sample.pdf - 1.0).abs() < 1e-5);
 //! # Ok::<(), fanlight::Error>(())
 //! ```
 //!
@@ -154,7 +155,7 @@ pub use error::Error;
 pub use glam;
 pub use light::{Illumination, Mesh, MeshUpdate, Sides, Weight};
 pub use receiver::{Receiver, ShadingPoint};
-pub use record::{Filter, Hit, LightSample, MeshId, TextureId, TriangleId, Wrap};
+pub use record::{Filter, Hit, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
 };

@@ -39,12 +39,12 @@ pub(crate) const ALL: &[Case] = &[
     Case {
         name: "cloud/pmf",
         calls: CALLS,
-        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pmf(s.hit.triangle)),
+        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pmf(s.hit().expect("a triangle").triangle)),
     },
     Case {
         name: "cloud/pdf",
         calls: CALLS,
-        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pdf(&s.hit)),
+        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pdf(&s.hit().expect("a triangle"))),
     },
     Case {
         name: "cloud/pdf_direction",
@@ -55,10 +55,18 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "cloud/nee", calls: CALLS, run: || next_event("cloud-10000") },
     Case { name: "cloud/build", calls: 1, run: build },
     Case { name: "quad/sample", calls: CALLS, run: || sample("quad") },
-    Case { name: "quad/pdf", calls: CALLS, run: || of_samples("quad", |lights, x, s| lights.at(x).pdf(&s.hit)) },
+    Case {
+        name: "quad/pdf",
+        calls: CALLS,
+        run: || of_samples("quad", |lights, x, s| lights.at(x).pdf(&s.hit().expect("a triangle"))),
+    },
     Case { name: "quad/nee", calls: CALLS, run: || next_event("quad") },
     Case { name: "window/sample", calls: CALLS, run: || sample("window") },
-    Case { name: "window/pdf", calls: CALLS, run: || of_samples("window", |lights, x, s| lights.at(x).pdf(&s.hit)) },
+    Case {
+        name: "window/pdf",
+        calls: CALLS,
+        run: || of_samples("window", |lights, x, s| lights.at(x).pdf(&s.hit().expect("a triangle"))),
+    },
     Case {
         name: "window/pdf_direction",
         calls: CALLS,

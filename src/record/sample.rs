@@ -22,12 +22,22 @@ impl Hit {
     }
 }
 
+/// What a sample was drawn on.
+///
+/// More kinds of lights may follow: match with a wildcard, and treat what is unknown like a sample of zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SampledLight {
+    /// A point of a triangle.
+    Triangle(Hit),
+}
+
 /// A point on a light, drawn for a shading point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LightSample {
-    /// Where on the lights the point lies.
-    pub hit: Hit,
+    /// What was drawn.
+    pub light: SampledLight,
     /// World position of the point.
     pub position: Vec3,
     /// Unit normal of the triangle's front side (its vertices run counter-clockwise around it).
@@ -45,4 +55,15 @@ pub struct LightSample {
     pub pdf_area: f32,
     /// Probability (`pmf`) of having chosen the triangle. In `(0, 1]`.
     pub pmf: f32,
+}
+
+impl LightSample {
+    /// Returns the point of the triangle that was drawn; `None` for any other kind of light.
+    #[inline]
+    #[must_use]
+    pub const fn hit(&self) -> Option<Hit> {
+        match self.light {
+            SampledLight::Triangle(hit) => Some(hit),
+        }
+    }
 }

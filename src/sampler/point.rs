@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::finite::{to_finite, to_positive};
 use crate::light::{LightPoint, LightView, LightViewKind};
 use crate::receiver::ShadingPoint;
-use crate::record::{Hit, LightSample, TriangleId};
+use crate::record::{Hit, LightSample, SampledLight, TriangleId};
 use crate::technique::{Drawn, Mixed, Mixture, Variates, Viewpoint};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
@@ -85,7 +85,7 @@ impl<'a> PointSampler<'a> {
     /// `sample.pdf`. Only what else the ray crosses is followed down the trees, so this is faster as well.
     #[must_use]
     pub fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
-        let own = self.at.scene.lights.leaf(sample.hit.triangle);
+        let own = sample.hit().and_then(|hit| self.at.scene.lights.leaf(hit.triangle));
         let others = self.direction_density(sample.direction, own, &self.mixture.one());
         to_finite(f64::from(sample.pdf) + others)
     }
@@ -168,7 +168,10 @@ fn light_sample(at: &Viewpoint<'_>, drawn: &Drawn, view: &LightView<'_>) -> Opti
     let distance = relative.length();
     let positive = drawn.pdf > 0.0 && distance > 0.0 && distance.is_finite();
     positive.then(|| LightSample {
-        hit: Hit { triangle: at.scene.lights.id(drawn.point.leaf), barycentrics: drawn.point.point.to_barycentrics() },
+        light: SampledLight::Triangle(Hit {
+            triangle: at.scene.lights.id(drawn.point.leaf),
+            barycentrics: drawn.point.point.to_barycentrics(),
+        }),
         position: (at.x.position.as_dvec3() + relative).as_vec3(),
         normal: view.normal(),
         direction: (relative / distance).as_vec3(),

@@ -77,7 +77,7 @@ fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
     for sample in &samples {
         check_numbers(sample);
         if is_ordinary(&x) {
-            assert_close(lights.at(&x).pdf_split(&sample.hit, &splitting), sample.pdf, sample);
+            assert_close(lights.at(&x).pdf_split(&sample.hit().expect("a triangle"), &splitting), sample.pdf, sample);
         }
     }
 }
@@ -85,7 +85,7 @@ fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
 fn check(lights: &LightSamplerView<'_>, x: &ShadingPoint, sample: &LightSample) {
     check_numbers(sample);
     if is_ordinary(x) {
-        assert_close(lights.at(x).pdf(&sample.hit), sample.pdf, sample);
+        assert_close(lights.at(x).pdf(&sample.hit().expect("a triangle")), sample.pdf, sample);
         let along = lights.at(x).pdf_sample_direction(sample);
         assert!(along.is_finite() && along >= sample.pdf * (1.0 - TOLERANCE), "{along} along {sample:?}");
     }

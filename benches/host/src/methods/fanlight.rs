@@ -96,10 +96,11 @@ impl LightsHere for Here<'_> {
         if self.fanlight.has_lights
             && let Some(sample) = self.lights.sample(random.uniform3())
         {
-            let TriangleId { mesh, triangle, .. } = sample.hit.triangle;
+            let Some(Hit { triangle: TriangleId { mesh, triangle, .. }, barycentrics, .. }) = sample.hit() else {
+                return;
+            };
             let (target, pdf) = match self.fanlight.starts.get(mesh.index() as usize) {
                 Some(first) => {
-                    let barycentrics = sample.hit.barycentrics;
                     let point = EmitterPoint { triangle: first + triangle, barycentrics, position: sample.position };
                     (Target::Emitter(point), sample.pdf)
                 }
