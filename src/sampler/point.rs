@@ -33,7 +33,9 @@ impl<'a> PointSampler<'a> {
     /// To be called with a literal, and itself a literal: what goes through a variable is copied, and a sampler is large.
     #[inline(always)]
     pub(super) fn new(at: Viewpoint<'a>) -> Self {
-        Self { mixture: Mixture::new(&at), at }
+        let mut sampler = Self { mixture: Mixture::of_trees(), at };
+        sampler.mixture.look_beside(&sampler.at);
+        sampler
     }
 
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the

@@ -6,6 +6,7 @@ use super::trees::{self, Trees};
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
 use glam::{DVec3, Vec3};
 
+use crate::env::RegionMoments;
 use crate::light::{LightPoint, LightView};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::{Variate, pick_pair};
@@ -78,54 +79,53 @@ impl Drawn {
 }
 
 impl Mixture {
-    /// Finds out what each technique accounts for at a shading point.
+    /// Finds out what there is besides the trees.
     #[inline(always)]
-    pub(crate) fn new(at: &Viewpoint<'_>) -> Self {
-        if at.scene.sky.is_some() {
-            Self::with_sky(at)
-        } else if at.scene.has_features() {
-            Self::balanced(at)
-        } else {
-            Self::of_trees()
+    pub(crate) fn look_beside(&mut self, at: &Viewpoint<'_>) {
+        if at.scene.has_features() {
+            self.add_features(at);
+        }
+        if let Some(regions) = at.scene.sky {
+            self.add_sky(at, regions);
         }
     }
 
     /// The trees alone.
     #[inline(always)]
-    fn of_trees() -> Self {
+    pub(crate) fn of_trees() -> Self {
         let shares = Shares { trees: 1.0, features: 0.0, sky: 0.0 };
         Self { first: None, features: None, rest: 1.0, sky: None, shares }
     }
 
-    /// Looks for features, and balances them with the trees. Returned as a whole, so that it is built in its place: it is
-    /// large, and most of it is seldom written.
+    /// Looks for features, and balances them with the trees. In place: the list of features is large, and most of it is
+    /// seldom written.
     #[inline(never)]
-    fn balanced(at: &Viewpoint<'_>) -> Self {
-        let mut features = VisibleFeatures::default();
+    fn add_features(&mut self, at: &Viewpoint<'_>) {
+        let features = self.features.insert(VisibleFeatures::default());
         features.find(at);
         let seen = features.irradiance();
         if !(seen > 0.0 && seen < MAX_IRRADIANCE) {
-            return Self::of_trees();
+            self.features = None;
+            return;
         }
         let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
-        let first = at.scene.tlas.first_weights(at);
-        let rest = trees::irradiance(at, first.as_ref());
-        let rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
-        let total = f64::from(seen) + f64::from(rest);
-        let shares = Shares { trees: f64::from(rest) / total, features: 1.0 / total, sky: 0.0 };
-        Self { first, features: Some(features), rest, sky: None, shares }
+        self.first = at.scene.tlas.first_weights(at);
+        let rest = trees::irradiance(at, self.first.as_ref());
+        self.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
+        let total = f64::from(seen) + f64::from(self.rest);
+        self.shares = Shares { trees: f64::from(self.rest) / total, features: 1.0 / total, sky: 0.0 };
     }
 
     /// Balances all that lights send with what the environment sends as a light.
     #[inline(never)]
-    fn with_sky(at: &Viewpoint<'_>) -> Self {
-        let mut mixture = if at.scene.has_features() { Self::balanced(at) } else { Self::of_trees() };
-        let Some(sky) = at.scene.sky.and_then(|moments| Sky::new(at, moments)) else { return mixture };
-        let lights = match &mixture.features {
-            Some(features) => features.total() + f64::from(mixture.rest),
+    fn add_sky(&mut self, at: &Viewpoint<'_>, regions: &RegionMoments) {
+        self.sky = Sky::new(at, regions);
+        let Some(sky) = &self.sky else { return };
+        let lights = match &self.features {
+            Some(features) => features.total() + f64::from(self.rest),
             None => {
-                mixture.first = at.scene.tlas.first_weights(at);
-                f64::from(trees::irradiance(at, mixture.first.as_ref()).min(MAX_IRRADIANCE))
+                self.first = at.scene.tlas.first_weights(at);
+                f64::from(trees::irradiance(at, self.first.as_ref()).min(MAX_IRRADIANCE))
             }
         };
         let share = if lights > 0.0 {
@@ -134,10 +134,8 @@ impl Mixture {
         } else {
             1.0
         };
-        let Shares { trees, features, .. } = mixture.shares;
-        mixture.shares = Shares { trees: (1.0 - share) * trees, features: (1.0 - share) * features, sky: share };
-        mixture.sky = Some(sky);
-        mixture
+        let Shares { trees, features, .. } = self.shares;
+        self.shares = Shares { trees: (1.0 - share) * trees, features: (1.0 - share) * features, sky: share };
     }
 
     /// Returns the mixture for single samples: one technique is chosen.
