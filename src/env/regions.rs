@@ -125,6 +125,12 @@ impl RegionMoments {
         self.least[region] = (LEAST_SHARE * rest * solid_angle).max(f32::MIN_POSITIVE);
     }
 
+    /// Direction in which the light of a region is centered.
+    #[inline]
+    pub(crate) fn axis(&self, region: usize) -> Vec3 {
+        Vec3::from_array(self.axes.map(|axis| axis[region]))
+    }
+
     /// Checks that no sum or product of sampling can be anything but finite.
     ///
     /// # Errors
@@ -273,10 +279,6 @@ mod tests {
         }
     }
 
-    fn axis(moments: &RegionMoments, region: usize) -> Vec3 {
-        Vec3::from_array(moments.axes.map(|axis| axis[region]))
-    }
-
     #[test]
     fn regions_are_summed_up() {
         let mut pcg = Pcg32::new(9, 1);
@@ -290,7 +292,7 @@ mod tests {
         moments.validate().expect("valid");
         // The region of the sun is centered at the sun, with next to no spread.
         let sun = region_at([11 / 8, 20 / 8]);
-        assert!(axis(&moments, sun).distance(center(6, [11, 20])) < 1e-3 && moments.spread[sun] < 0.05);
+        assert!(moments.axis(sun).distance(center(6, [11, 20])) < 1e-3 && moments.spread[sun] < 0.05);
         // A black region is nothing.
         let black = region_at([0, 4]);
         assert_eq!([moments.flux[black], moments.least[black], moments.reach[black]], [0.0; 3]);

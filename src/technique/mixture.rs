@@ -30,8 +30,8 @@ const MAX_IRRADIANCE: f32 = 1e35;
 /// Least probability of the environment next to the lights, and of the lights next to the environment. Estimates know of no
 /// walls: the environment may be all but hidden where a lamp is not, and a lamp where the environment is not.
 ///
-/// Measured on the host bench's street (docs/HOST.md). A larger value wastes samples where one of both outshines the other;
-/// with a smaller one, what the estimates take for dark is noisier, by the inverse of this.
+/// Measured on the host bench's street (docs/CONSTANTS.md). A larger value wastes samples where one of both outshines the
+/// other; with a smaller one, what is dark by the estimates alone is noisier, by the inverse of this.
 const LEAST_BESIDE: f64 = 0.1;
 
 /// The techniques at one shading point, as far as they have been found out once for all questions.
@@ -177,13 +177,13 @@ impl Mixed<'_> {
     /// Draws a direction of the environment as a light, if anything can arrive from it.
     #[inline(never)]
     pub(crate) fn sample_sky(&self, at: &Viewpoint<'_>, u: [Variate; 2]) -> Option<SkyDirection> {
-        let SkyDirection { direction, pdf } = self.mixture.sky.as_ref()?.sample(&at.scene.environment, u)?;
+        let SkyDirection { direction, pdf } = self.mixture.sky.as_ref()?.sample(at, u)?;
         Some(SkyDirection { direction, pdf: self.shares.sky * pdf })
     }
 
     /// Returns the density of a unit direction by the environment as a light.
     pub(crate) fn sky_density(&self, at: &Viewpoint<'_>, direction: Vec3) -> f64 {
-        self.mixture.sky.as_ref().map_or(0.0, |sky| self.shares.sky * sky.pdf(&at.scene.environment, direction))
+        self.mixture.sky.as_ref().map_or(0.0, |sky| self.shares.sky * sky.pdf(at, direction))
     }
 
     /// Draws a point on a light by one of the techniques.

@@ -19,11 +19,12 @@ use crate::receiver::{Receiver, ReceiverKind};
 use crate::simd::{InstructionSet, Kernel};
 use crate::warp::{Variate, keep_positive};
 
-/// Levels of the pyramid below a region that are weighed by the receiver where the horizon cuts the region. Chosen, not
-/// swept: texels of three degrees remain.
+/// Levels of the pyramid below a region that are weighed by the receiver where the horizon cuts the region. *Measured* on the
+/// host bench's street (docs/CONSTANTS.md): 0 and 3 are as good there. Chosen for suns at the horizon, which are in texels of
+/// six degrees then.
 ///
 /// Larger: slower in these regions. Smaller: more samples below the horizon.
-const CUT_LEVELS: u32 = 3;
+const CUT_LEVELS: u32 = 2;
 
 /// Largest coordinate of a position at which anything arrives. *Format*: documented at
 /// [`ShadingPoint::position`](crate::ShadingPoint::position).
@@ -36,8 +37,6 @@ pub(super) struct Sky {
     sums: RegionSums,
     /// The receiver in the environment's frame.
     receiver: Receiver,
-    /// A set of bits: regions that the horizon cuts.
-    cut: u64,
 }
 
 /// A direction of the environment that was drawn.
@@ -59,16 +58,15 @@ struct Place {
 
 impl Sky {
     /// Weighs all regions. `None` if nothing can arrive.
-    pub(super) fn new(at: &Viewpoint<'_>, moments: &RegionMoments) -> Option<Self> {
+    pub(super) fn new(at: &Viewpoint<'_>, regions: &RegionMoments) -> Option<Self> {
         if !at.x.position.abs().cmple(Vec3::splat(POSITION_LIMIT)).all() {
             return None;
         }
         let environment = &at.scene.environment;
         let local = |normal: Vec3| Vec3::from_array(environment.local_vector(normal.to_array()));
         let receiver = at.x.receiver.map_normal(local);
-        let mut sky = Self { sums: RegionSums::new(&[0.0; REGIONS]), receiver, cut: 0 };
-        InstructionSet::best().run(WeighRegions { moments, receiver, sky: &mut sky });
-        (sky.sums.total() > 0.0).then_some(sky)
+        let sums = InstructionSet::best().run(WeighRegions { regions, receiver });
+        (sums.total() > 0.0).then_some(Self { sums, receiver })
     }
 
     /// Estimate of the irradiance.
@@ -77,25 +75,27 @@ impl Sky {
     }
 
     /// Draws a direction. `None` where the part of the regions that the variates lead to is below the horizon.
-    pub(super) fn sample(&self, environment: &EnvironmentView<'_>, mut u: [Variate; 2]) -> Option<SkyDirection> {
+    pub(super) fn sample(&self, at: &Viewpoint<'_>, mut u: [Variate; 2]) -> Option<SkyDirection> {
         let mut region = [0, 0];
         for depth in 0..REGION_DEPTH {
             region = step(self.sums.children(depth, region), region, &mut u);
         }
-        let place = self.walk(environment, region, |_, texel, weights| step(weights, texel, &mut u))?;
+        let place = self.walk(at, region, |_, texel, weights| step(weights, texel, &mut u))?;
+        let environment = &at.scene.environment;
         let sample = environment.sample_below(place.depth, place.texel, &mut u);
         let pdf = place.density(environment, sample.radiance);
         (pdf > 0.0).then_some(SkyDirection { direction: sample.direction, pdf })
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] draws a unit world direction.
-    pub(super) fn pdf(&self, environment: &EnvironmentView<'_>, direction: Vec3) -> f64 {
+    pub(super) fn pdf(&self, at: &Viewpoint<'_>, direction: Vec3) -> f64 {
+        let environment = &at.scene.environment;
         let depth = environment.header.depth.max(REGION_DEPTH + CUT_LEVELS);
         let texel = environment.texel_in(depth, direction);
         let below = depth - REGION_DEPTH;
         let region = texel.map(|i| i >> below);
-        let place = self.walk(environment, region, |depth, _, _| texel.map(|i| i >> (below + REGION_DEPTH - depth)));
-        place.map_or(0.0, |place| place.density(environment, environment.radiance(direction)))
+        let place = self.walk(at, region, |depth, _, _| texel.map(|i| i >> (below + REGION_DEPTH - depth)));
+        place.map_or(0.0, |place| place.density(environment, environment.mean_in(depth, texel)))
     }
 
     /// Goes down from a region to the last texel that is weighed by the receiver. `choose` gets a depth, the texel of the
@@ -103,7 +103,7 @@ impl Sky {
     #[inline(always)]
     fn walk(
         &self,
-        environment: &EnvironmentView<'_>,
+        at: &Viewpoint<'_>,
         region: [u32; 2],
         mut choose: impl FnMut(u32, [u32; 2], [f32; 4]) -> [u32; 2],
     ) -> Option<Place> {
@@ -114,9 +114,9 @@ impl Sky {
         }
         let probability = f64::from(weight) / f64::from(self.sums.total());
         let mut place = Place { depth: REGION_DEPTH, texel: region, probability };
-        if self.cut >> number & 1 == 1 {
+        if self.is_cut(at.scene.sky?, number) {
             for depth in REGION_DEPTH + 1..=REGION_DEPTH + CUT_LEVELS {
-                let weights = self.weights_below(environment, place.texel, depth);
+                let weights = self.weights_below(&at.scene.environment, place.texel, depth);
                 let total = weights.iter().sum::<f32>();
                 if total == 0.0 {
                     return None;
@@ -128,6 +128,12 @@ impl Sky {
             }
         }
         Some(place)
+    }
+
+    /// Whether the horizon cuts a region.
+    #[inline]
+    fn is_cut(&self, regions: &RegionMoments, region: usize) -> bool {
+        self.receiver.has_horizon() && self.receiver.normal().dot(regions.axis(region)) < regions.reach[region]
     }
 
     /// Weights of the four texels of a level below one of the level above. Zero only if nothing can arrive.
@@ -158,38 +164,29 @@ impl Place {
 }
 
 /// Weighs all regions in one loop over plain arrays.
-struct WeighRegions<'m, 's> {
-    moments: &'m RegionMoments,
+struct WeighRegions<'m> {
+    regions: &'m RegionMoments,
     receiver: Receiver,
-    sky: &'s mut Sky,
 }
 
-impl Kernel for WeighRegions<'_, '_> {
-    type Output = ();
+impl Kernel for WeighRegions<'_> {
+    type Output = RegionSums;
 
     #[inline(always)]
-    fn run(self) {
-        let Self { moments, receiver, sky } = self;
-        let (mut means, mut bounds) = ([0.0; REGIONS], [0.0; REGIONS]);
-        receiver.means_over_cones(&moments.axes, &moments.spread, &mut means);
-        receiver.means_over_cones(&moments.axes, &moments.reach, &mut bounds);
+    fn run(self) -> RegionSums {
+        let Self { regions, receiver } = self;
         let mut weights = [0.0; REGIONS];
+        receiver.means_over_cones(&regions.axes, &regions.spread, &mut weights);
+        // Without a horizon, nothing is below it.
+        let normal = receiver.normal();
+        let reach = if receiver.has_horizon() { 1.0 } else { f32::INFINITY };
+        let [x, y, z] = &regions.axes;
         for i in 0..REGIONS {
-            weights[i] = only_if(bounds[i] > 0.0, moments.flux[i] * means[i] + moments.least[i]);
+            let height = normal.x * x[i] + normal.y * y[i] + normal.z * z[i];
+            let weight = regions.flux[i] * weights[i] + regions.least[i];
+            weights[i] = only_if(height > -(reach * regions.reach[i]), weight);
         }
         keep_positive(&mut weights);
-        sky.sums = RegionSums::new(&weights);
-        if receiver.has_horizon() {
-            let normal = receiver.normal();
-            let [x, y, z] = &moments.axes;
-            let mut cut = [0_u8; REGIONS];
-            for i in 0..REGIONS {
-                let height = normal.x * x[i] + normal.y * y[i] + normal.z * z[i];
-                cut[i] = u8::from(height < moments.reach[i]);
-            }
-            for (i, cut) in cut.iter().enumerate() {
-                sky.cut |= u64::from(*cut) << i;
-            }
-        }
+        RegionSums::new(&weights)
     }
 }
