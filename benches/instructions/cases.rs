@@ -3,7 +3,8 @@
 use core::hint::black_box;
 
 use fanlight::{
-    Environment, LightSample, LightSampler, LightSamplerBuilder, Mesh, ShadingPoint, Splitting, Texture, Weight,
+    Environment, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, ShadingPoint, Splitting, Texture,
+    TriangleId, Weight,
 };
 use smallvec::SmallVec;
 
@@ -89,7 +90,25 @@ pub(crate) const ALL: &[Case] = &[
         calls: CALLS,
         run: || environment(|sky, u| sky.pdf(glam::Vec3::from(u).normalize())),
     },
+    Case {
+        name: "environment-light/at",
+        calls: CALLS,
+        run: || environment_light(|lights, x, _| black_box(&lights.at(x)).pmf(NONE)),
+    },
+    Case {
+        name: "environment-light/sample",
+        calls: CALLS,
+        run: || environment_light(|lights, x, u| lights.at(x).sample(u).map_or(0.0, |sample| sample.pdf)),
+    },
+    Case {
+        name: "environment-light/pdf",
+        calls: CALLS,
+        run: || environment_light(|lights, x, u| lights.at(x).pdf_environment(glam::Vec3::from(u) - 0.5)),
+    },
 ];
+
+/// A triangle that no workload has.
+const NONE: TriangleId = TriangleId::new(MeshId::from_index(u32::MAX), 0);
 
 /// Everything in here is counted, and nothing else.
 #[inline(never)]
@@ -227,5 +246,15 @@ fn environment(call: fn(&Environment, [f32; 3]) -> f32) {
     let numbers = numbers();
     measured(|i| {
         black_box(call(&sky, numbers[i]));
+    });
+}
+
+/// The sky of the workloads as the only light, at the points of the window.
+fn environment_light(call: fn(&LightSampler, &ShadingPoint, [f32; 3]) -> f32) {
+    let sky = scenes::sky::Sky::new().environment;
+    let lights = LightSampler::builder().environment(sky).environment_as_light().build().expect("the sky is a light");
+    let (points, numbers) = (scenes::scene("window").points.timing(CALLS), numbers());
+    measured(|i| {
+        black_box(call(&lights, &points[i], numbers[i]));
     });
 }
