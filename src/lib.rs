@@ -57,7 +57,10 @@
 //! [`sample`](PointSampler::sample) at a [`ShadingPoint::volume`] at its position.
 //!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
-//! BSDF samples, or with [`Environment::sample`].
+//! BSDF samples, or with [`Environment::sample`], or make the environment a light
+//! ([`environment_as_light`](LightSamplerBuilder::environment_as_light)). Then a sample may be a direction of it
+//! ([`SampledLight`]), and [`pdf_environment`](PointSampler::pdf_environment) is the density of a ray that leaves a scene
+//! without portals.
 //!
 //! The [`guide`] goes through the integration into a renderer, and has a table of mistakes and what they look like.
 //!
