@@ -126,6 +126,10 @@ pub(crate) trait LightKind {
     /// Whether anything can travel from the light to the shading point.
     fn is_visible(&self, x: &ShadingPoint) -> bool;
 
+    /// Returns the irradiance from a light of unit radiance, per area of the light, exact as far as `f32` goes. Rounding may
+    /// make it zero.
+    fn irradiance_per_area(&self, x: &ShadingPoint) -> f32;
+
     /// Returns the point where a ray crosses the light, if it does. `direction` need not be a unit vector.
     fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<Lattice>;
 
@@ -197,6 +201,10 @@ impl LightKind for Light<'_> {
     #[inline]
     fn is_visible(&self, x: &ShadingPoint) -> bool {
         dispatch!(Light, self, kind => kind.is_visible(x))
+    }
+
+    fn irradiance_per_area(&self, x: &ShadingPoint) -> f32 {
+        dispatch!(Light, self, kind => kind.irradiance_per_area(x))
     }
 
     #[inline]

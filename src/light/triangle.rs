@@ -1,5 +1,7 @@
 //! A triangle of an emissive mesh or of a portal.
 
+use core::f32::consts::PI;
+
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -101,6 +103,12 @@ impl LightKind for LightTriangle {
         let triangle = self.triangle();
         let side = triangle.double_area_vector().dot(triangle.exactly_relative_to(x.position)[0]);
         self.emits_to(side) && !x.receiver.is_dark(&triangle.relative_to(x.position))
+    }
+
+    fn irradiance_per_area(&self, x: &ShadingPoint) -> f32 {
+        let triangle = self.triangle();
+        let irradiance = x.receiver.irradiance(&triangle.relative_to(x.position));
+        triangle.normal_and_area().map_or(0.0, |(_, area)| PI * irradiance / area)
     }
 
     #[inline]

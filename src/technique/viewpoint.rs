@@ -89,4 +89,8 @@ impl LeafOracle for Viewpoint<'_> {
     fn is_visible(&self, leaf: u32) -> bool {
         self.scene.lights.energy > 0.0 && self.scene.lights.light(leaf).is_visible(&self.x)
     }
+
+    fn irradiance_per_area(&self, leaf: u32) -> f32 {
+        self.scene.lights.light(leaf).irradiance_per_area(&self.x)
+    }
 }

@@ -53,6 +53,10 @@ impl LeafOracle for Before<'_> {
     fn is_visible(&self, leaf: u32) -> bool {
         !self.odd_alone || leaf % 2 == 1
     }
+
+    fn irradiance_per_area(&self, _leaf: u32) -> f32 {
+        1.0
+    }
 }
 
 /// All leaves are visible.

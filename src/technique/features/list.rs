@@ -59,7 +59,7 @@ impl VisibleFeatures {
 
     /// Forgets all but the first entries.
     #[inline]
-    pub(super) fn truncate(&mut self, len: usize) {
+    fn truncate(&mut self, len: usize) {
         self.visible.truncate(len);
         self.weights.truncate(len);
     }

@@ -14,7 +14,7 @@ mod texel_cut;
 mod view;
 
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
-use crate::blas::{Lattice, LatticeCell};
+use crate::blas::Lattice;
 use crate::env::FeatureNode;
 use crate::light::{LightKind, LightPoint, LightView, LightViewKind};
 use crate::math;
@@ -23,68 +23,19 @@ use crate::warp::{Variate, pick, sum};
 use groups::{Group, Groups};
 pub(crate) use list::VisibleFeatures;
 use list::{ANY_PORTAL, MAX_VISIBLE, VisibleFeature};
-use opening::{Coverage, Opening};
 use view::FeatureView;
-
-/// Most lights for which each is looked at for all features at once, without a walk down the tree. Chosen on windows, not
-/// swept.
-///
-/// Larger: lights are looked at that no feature is seen through. Smaller: walks that find the same few lights each time.
-const FEW_PORTALS: usize = 4;
 
 impl VisibleFeatures {
     /// Lists all features that are visible from a shading point.
     pub(super) fn find(&mut self, at: &Viewpoint<'_>) {
         let mut groups = Groups::empty();
         groups.fill(at);
-        if at.scene.lights.len() <= FEW_PORTALS {
-            if self.find_through_all(groups.as_slice(), at) {
-                return;
-            }
-            // In the other order each group keeps a place.
-            self.truncate(0);
-        }
         let mut left = groups.as_slice().len();
         for group in groups.as_slice() {
             left -= 1;
             // Every group after this one keeps a place.
             self.find_group(*group, MAX_VISIBLE - left, at);
         }
-    }
-
-    /// Appends the parts of all portals that groups of features are visible through, if there is room for all. Looks at each
-    /// portal once.
-    fn find_through_all(&mut self, groups: &[Group], at: &Viewpoint<'_>) -> bool {
-        let environment = &at.scene.environment;
-        if groups.is_empty() {
-            return true;
-        }
-        for leaf in 0..at.scene.lights.len() as u32 {
-            let scale = at.scene.lights.scale(leaf);
-            if !at.scene.lights.light(leaf).is_portal() || scale == 0.0 {
-                continue;
-            }
-            let view = &at.view(leaf);
-            let Some(triangle) = view.as_ref().and_then(LightView::as_portal) else { continue };
-            let opening = Opening::of_cell(environment, triangle, LatticeCell::whole());
-            for &Group { node, cosine } in groups {
-                if opening.coverage(&environment.feature_nodes()[node as usize]) == Coverage::Nothing {
-                    continue;
-                }
-                self.note(triangle.is_close());
-                let mut is_full = false;
-                FeatureView::new(triangle, environment, node as usize).visit(&opening, |part, through| {
-                    is_full |= self.len() == MAX_VISIBLE;
-                    if !is_full {
-                        self.push(leaf, node, part, through * scale * cosine);
-                    }
-                });
-                if is_full {
-                    return false;
-                }
-            }
-        }
-        true
     }
 
     /// Appends the parts of portals that a group of features is visible through, as long as there are fewer than `end`.
@@ -107,8 +58,7 @@ impl VisibleFeatures {
             let view = &at.view(leaf);
             let Some(triangle) = view.as_ref().and_then(LightView::as_portal) else { return };
             self.note(triangle.is_close());
-            let opening = Opening::of_cell(environment, triangle, LatticeCell::whole());
-            FeatureView::new(triangle, environment, node as usize).visit(&opening, |part, through| {
+            FeatureView::new(triangle, environment, node as usize).visit(|part, through| {
                 if self.len() < end {
                     self.push(leaf, node, part, through * scale * cosine);
                 } else {

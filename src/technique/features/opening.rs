@@ -4,9 +4,7 @@
 use glam::{DVec3, Vec3};
 
 use super::texel_cut::TexelCut;
-use crate::blas::LatticeCell;
 use crate::env::{EnvironmentView, FeatureNode, FeatureTexel};
-use crate::light::{LightViewKind, TriangleView};
 use crate::warp::Variate;
 
 /// The directions between three planes through the viewer.
@@ -41,11 +39,6 @@ impl Opening {
         let sign = 1f64.copysign(planes[0].dot(a));
         let inwards = |plane: DVec3| (sign * plane).normalize_or_zero().as_vec3();
         Self { planes: planes.map(|plane| environment.local_direction(inwards(plane))) }
-    }
-
-    /// The directions in which a cell of a triangle is visible.
-    pub(super) fn of_cell(environment: &EnvironmentView<'_>, triangle: &TriangleView<'_>, cell: LatticeCell) -> Self {
-        Self::new(environment, cell.corners().map(|corner| triangle.point(corner)))
     }
 
     /// Bounds how much of a node the opening shows, by the cone around the node.

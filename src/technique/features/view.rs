@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::opening::{Coverage, Opening};
 use crate::blas::{self, ARITY, CHILD_CENTERS, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{EnvironmentView, FeatureNode};
-use crate::light::TriangleView;
+use crate::light::{LightViewKind, TriangleView};
 use crate::math;
 use crate::warp::Variate;
 
@@ -66,7 +66,7 @@ impl<'a> FeatureView<'a> {
 
     /// The directions in which a cell is visible.
     fn opening(&self, cell: LatticeCell) -> Opening {
-        Opening::of_cell(self.environment, self.triangle, cell)
+        Opening::new(self.environment, cell.corners().map(|corner| self.triangle.point(corner)))
     }
 
     /// Power of the feature through a cell, as if the cell's texture were one.
@@ -75,22 +75,25 @@ impl<'a> FeatureView<'a> {
     }
 
     /// Passes every part of the triangle through which the feature is visible to `found`, with the power through the
-    /// part times an estimate of its opacity. A part has one opacity, or is small. `opening` is that of the whole triangle.
-    pub(super) fn visit(&self, opening: &Opening, mut found: impl FnMut(FeaturePart, f32)) {
+    /// part times an estimate of its opacity. A part has one opacity, or is small.
+    pub(super) fn visit(&self, mut found: impl FnMut(FeaturePart, f32)) {
         let TriangleView { root, cells, .. } = *self.triangle;
         let scale = if root.node == LEAF { 1.0 } else { root.average / blas::mean(cells, root.node) };
-        self.visit_below((LatticeCell::whole(), *self.triangle.vertices()), opening, root, scale, &mut found);
+        self.visit_below((LatticeCell::whole(), *self.triangle.vertices()), root, scale, &mut found);
     }
 
     fn visit_below(
         &self,
         (cell, corners): (LatticeCell, [Vec3; 3]),
-        opening: &Opening,
         below: Root,
         scale: f32,
         found: &mut impl FnMut(FeaturePart, f32),
     ) {
-        if below.average == 0.0 || opening.coverage(self.bright()) == Coverage::Nothing {
+        if below.average == 0.0 {
+            return;
+        }
+        let opening = self.opening(cell);
+        if opening.coverage(self.bright()) == Coverage::Nothing {
             return;
         }
         if below.node == LEAF {
@@ -111,12 +114,8 @@ impl<'a> FeatureView<'a> {
         let averages = blas::averages(self.triangle.cells, below.node);
         let apart = self.are_apart(&corners);
         for (i, average) in averages.into_iter().enumerate().filter(|(i, _)| !apart[*i]) {
-            if average == 0.0 {
-                continue;
-            }
             let root = Root { average: average * scale, node: blas::below(self.triangle.cells, below.node, i) };
-            let child = cell.child(i);
-            self.visit_below((child, blas::child_corners(&corners, i)), &self.opening(child), root, scale, found);
+            self.visit_below((cell.child(i), blas::child_corners(&corners, i)), root, scale, found);
         }
     }
 

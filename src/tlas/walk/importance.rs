@@ -5,8 +5,8 @@
 //! A cluster's position and normal are taken for normal variables with its mean and variance; cosines become the
 //! expectation of a clamped normal variable.
 //!
-//! Moments say little of a cluster around the shading point, or of one in doubt: such a child is opened, which means that
-//! the sum of its own children's weights is its weight.
+//! Moments say little of what is near the shading point. A cluster there is opened, which means that the sum of its own
+//! children's weights is its weight. A light there is weighed by its exact irradiance.
 
 use glam::Vec3;
 
@@ -32,6 +32,10 @@ pub(crate) trait LeafOracle {
     /// Whether anything at all can travel from a leaf to the shading point. Asked only where the bounds of a leaf leave
     /// that open.
     fn is_visible(&self, leaf: u32) -> bool;
+
+    /// Returns the irradiance from a leaf of unit radiance, per area of it. Rounding may make it zero. Asked only of leaves
+    /// near the shading point.
+    fn irradiance_per_area(&self, leaf: u32) -> f32;
 }
 
 impl<O: LeafOracle> LeafOracle for &O {
@@ -49,20 +53,26 @@ impl<O: LeafOracle> LeafOracle for &O {
     fn is_visible(&self, leaf: u32) -> bool {
         (**self).is_visible(leaf)
     }
+
+    #[inline(always)]
+    fn irradiance_per_area(&self, leaf: u32) -> f32 {
+        (**self).irradiance_per_area(leaf)
+    }
 }
 
 /// Cosine at the lights up to which a single triangle is asked whether it is visible. *Proved*: covers the rounding of
 /// normals, at most √3 / 2 of 1 / 510. A larger one only asks more often.
 const EDGE_COSINE: f32 = 3e-3;
-/// Radius of a child's ball, relative to the distance of its center, from which on the child is opened. Chosen, not swept:
-/// with 1, the ball holds the point. The effect of opening is in docs/ACCURACY.md, "Choosing a triangle".
+/// Radius of a child's ball, relative to the distance of its center, from which on the child counts as near. *Measured* on
+/// clouds, spheres, domes and windows (docs/ACCURACY.md, "Opening what is near").
 ///
 /// Larger: the moments of clusters around the point are trusted. Smaller: more children are opened, which costs time.
-const OPENING: f32 = 1.0;
-/// Share of the largest weight below which a child is not opened for doubt alone. Chosen, not swept.
+const OPENING: f32 = 0.7;
+/// Least weight of a leaf near the shading point, relative to that by its moments. It stands in for what rounding takes from
+/// the exact irradiance. *Chosen*: below a thousandth of the largest weight, `f32` still has the irradiance to 1e-3.
 ///
-/// Larger: more samples find nothing. Smaller: more children are opened, which costs time.
-const LEAST_DOUBTED_SHARE: f32 = 1.0 / 16.0;
+/// Larger: more samples of triangles that the point hardly sees. Smaller: what rounding takes away is not sampled.
+const LEAST_NEAR_SHARE: f32 = 1e-3;
 /// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
 const LEAST_DISTANCE2: f32 = 1e-30;
 
@@ -83,27 +93,26 @@ struct Estimates<const N: usize> {
     weights: [f32; N],
     /// Bits of the largest weight.
     largest: u32,
-    /// A set of bits: leaves of which the bounds do not decide whether they are visible.
-    doubtful: u32,
-    /// Two sets of bits: children near the shading point, and those that are dark by their moments, at the receiver and at
-    /// the lights, though their bounds do not prove it.
-    opened: [u32; 2],
+    /// Two sets of bits: leaves of which the bounds do not decide whether they are visible, and leaves near the shading
+    /// point.
+    doubtful: [u32; 2],
+    /// A set of bits: nodes near the shading point that may send something.
+    opened: u32,
 }
 
 impl<const N: usize> WideTree<'_, N> {
     /// Returns the weight of every child of a node. All zero where nothing below the node can be visible.
     ///
-    /// A child that is a node itself and whose moments say little from here is opened: the sum of its own children's
-    /// weights is its weight. That is one level, and depends on the shading point alone.
+    /// A child that is a node itself and near the shading point is opened: the sum of its own children's weights is its
+    /// weight. That is one level, and depends on the shading point alone.
     #[inline(always)]
     pub(super) fn weights(&self, index: usize, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
         let node = &self.nodes[index];
-        let Estimates { mut weights, mut largest, opened, .. } = node.asked(x, oracle);
-        let mut waiting = node.worth_opening(opened, &weights, largest);
-        if waiting != 0 {
-            while waiting != 0 {
-                let lane = waiting.trailing_zeros();
-                waiting &= waiting - 1;
+        let Estimates { mut weights, mut largest, mut opened, .. } = node.asked(x, oracle);
+        if opened != 0 {
+            while opened != 0 {
+                let lane = opened.trailing_zeros();
+                opened &= opened - 1;
                 let child = node.first_node.wrapping_add(lane);
                 weights[lane as usize] = self.opened(child as usize, x, oracle);
             }
@@ -126,8 +135,9 @@ impl<const N: usize> Node<N> {
     #[inline(always)]
     fn asked(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> Estimates<N> {
         let mut estimates = self.estimates(x);
-        if estimates.doubtful != 0 {
-            estimates.largest = self.ask(oracle, &mut estimates.weights, estimates.doubtful);
+        let [doubtful, near] = estimates.doubtful;
+        if doubtful | near != 0 {
+            estimates.largest = self.ask(oracle, &mut estimates.weights, doubtful, near);
         }
         if { self.portals } != [0; N] {
             estimates.largest = self.look_through(x, oracle, &mut estimates.weights);
@@ -135,31 +145,19 @@ impl<const N: usize> Node<N> {
         estimates
     }
 
-    /// Returns the children to be opened of those in question, as a set of bits.
-    #[inline(always)]
-    fn worth_opening(&self, [near, uncertain]: [u32; 2], weights: &[f32; N], largest: u32) -> u32 {
-        let inner = !(u32::MAX << self.node_count);
-        if (near | uncertain) & inner == 0 {
-            return 0;
-        }
-        let least = LEAST_DOUBTED_SHARE * f32::from_bits(largest);
-        let (mut heavy, mut possible) = (0, 0);
-        for (i, &weight) in weights.iter().enumerate() {
-            heavy |= u32::from(weight >= least) << i;
-            possible |= u32::from(weight > 0.0) << i;
-        }
-        (near | uncertain & heavy) & possible & inner
-    }
-
-    /// Asks the oracle about leaves in doubt, and returns the bits of the largest weight.
+    /// Asks the oracle about leaves in doubt and leaves nearby, and returns the bits of the largest weight.
     #[inline(never)]
-    fn ask(&self, oracle: &impl LeafOracle, weights: &mut [f32; N], mut doubtful: u32) -> u32 {
-        while doubtful != 0 {
-            let lane = doubtful.trailing_zeros() as usize;
-            doubtful &= doubtful - 1;
+    fn ask(&self, oracle: &impl LeafOracle, weights: &mut [f32; N], doubtful: u32, near: u32) -> u32 {
+        let mut waiting = doubtful | near;
+        while waiting != 0 {
+            let lane = waiting.trailing_zeros() as usize;
+            waiting &= waiting - 1;
             let Child::Leaf(leaf) = self.child(lane) else { continue };
-            if !oracle.is_visible(leaf) {
+            if doubtful >> lane & 1 != 0 && !oracle.is_visible(leaf) {
                 weights[lane] = 0.0;
+            } else if near >> lane & 1 != 0 && weights[lane] > 0.0 {
+                let exact = wide(self.energies[lane]) * oracle.irradiance_per_area(leaf);
+                weights[lane] = within_range(at_least(exact, LEAST_NEAR_SHARE * weights[lane]));
             }
         }
         weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()))
@@ -205,7 +203,7 @@ impl<const N: usize> Node<N> {
         let mean_step = half_step * (1.0 / MEAN_STEPS);
         let (horizon, absolute_horizon, normal) = (x.horizon, x.horizon.abs(), x.normal);
         let mut weights = [0.0; N];
-        let (mut largest, mut doubtful, mut near, mut uncertain) = (0, 0, 0, 0);
+        let (mut largest, mut doubtful, mut near) = (0, 0, 0);
         for i in 0..N {
             let counts = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
             let half = counts * half_step;
@@ -254,11 +252,10 @@ impl<const N: usize> Node<N> {
             largest = largest.max(weights[i].to_bits());
             let averted = facing < EDGE_COSINE * distance;
             doubtful |= u32::from((straddles | averted) & !culled) << i;
-            near |= u32::from(radius2 > OPENING * OPENING * distance2) << i;
-            uncertain |= u32::from(straddles & averted & (side < EDGE_COSINE * distance)) << i;
+            near |= u32::from((radius2 > OPENING * OPENING * distance2) & !culled) << i;
         }
         let leaves = self.children() & (u32::MAX << self.node_count);
-        Estimates { weights, largest, doubtful: doubtful & leaves, opened: [near, uncertain] }
+        Estimates { weights, largest, doubtful: [doubtful & leaves, near & leaves], opened: near & !leaves }
     }
 }
 

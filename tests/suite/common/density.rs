@@ -26,6 +26,9 @@ pub(crate) fn id((mesh, triangle): (usize, usize)) -> TriangleId {
 /// From here on cells are so small that four equal values settle them.
 const DEEPEST_DOUBT: u32 = 8;
 
+/// Cells with more probability are divided, however equal the density looks: what little they hide would count.
+const HEAVY: f64 = 2e-5;
+
 mod walk;
 
 use walk::{Cell, Open, Walk};

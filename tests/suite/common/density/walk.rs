@@ -5,7 +5,7 @@ extern crate alloc;
 use alloc::collections::BinaryHeap;
 use core::cmp::Ordering;
 
-use super::{DEEPEST_DOUBT, Density, NEGLIGIBLE_DOUBT, OnTriangle, middle, quarter, step, tip};
+use super::{DEEPEST_DOUBT, Density, HEAVY, NEGLIGIBLE_DOUBT, OnTriangle, middle, quarter, step, tip};
 use crate::common::pcg::Pcg32;
 
 /// A dyadic part of a triangle.
@@ -130,6 +130,10 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
         let quarters = cell.quarters();
         let values = quarters.map(|q| self.on.density(middle(q)));
+        let densest = values.iter().fold(0.0, |densest: f64, value| densest.max(value.by_area()));
+        if !self.on.is_limited() && cell.depth < self.on.deepest && cell.share() * densest > HEAVY {
+            return self.divide(cell);
+        }
         let are_equal = range(values.iter().map(|v| v.pdf)) == 0.0 || range(values.iter().map(|v| v.by_area())) == 0.0;
         // Averages are rounded, so that four can be the same by chance: then their quarters must be, too.
         let mut parts = Vec::new();
