@@ -103,7 +103,9 @@ fn lights(criterion: &mut Criterion) {
         let drawn: Vec<(ShadingPoint, Hit, Vec3)> = points
             .iter()
             .zip(&numbers)
-            .filter_map(|(x, u)| sampler.at(x).sample(*u).map(|sample| (*x, sample.hit, sample.direction)))
+            .filter_map(|(x, u)| {
+                sampler.at(x).sample(*u).map(|sample| (*x, sample.hit().expect("a triangle"), sample.direction))
+            })
             .collect();
         group.bench_function("pmf", |b| {
             in_circle(b, drawn.len(), |i| sampler.at(&drawn[i].0).pmf(drawn[i].1.triangle));

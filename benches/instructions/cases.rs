@@ -3,7 +3,8 @@
 use core::hint::black_box;
 
 use fanlight::{
-    Environment, LightSample, LightSampler, LightSamplerBuilder, Mesh, ShadingPoint, Splitting, Texture, Weight,
+    Environment, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, ShadingPoint, Splitting, Texture,
+    TriangleId, Weight,
 };
 use smallvec::SmallVec;
 
@@ -39,12 +40,12 @@ pub(crate) const ALL: &[Case] = &[
     Case {
         name: "cloud/pmf",
         calls: CALLS,
-        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pmf(s.hit.triangle)),
+        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pmf(s.hit().expect("a triangle").triangle)),
     },
     Case {
         name: "cloud/pdf",
         calls: CALLS,
-        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pdf(&s.hit)),
+        run: || of_samples("cloud-10000", |lights, x, s| lights.at(x).pdf(&s.hit().expect("a triangle"))),
     },
     Case {
         name: "cloud/pdf_direction",
@@ -55,10 +56,18 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "cloud/nee", calls: CALLS, run: || next_event("cloud-10000") },
     Case { name: "cloud/build", calls: 1, run: build },
     Case { name: "quad/sample", calls: CALLS, run: || sample("quad") },
-    Case { name: "quad/pdf", calls: CALLS, run: || of_samples("quad", |lights, x, s| lights.at(x).pdf(&s.hit)) },
+    Case {
+        name: "quad/pdf",
+        calls: CALLS,
+        run: || of_samples("quad", |lights, x, s| lights.at(x).pdf(&s.hit().expect("a triangle"))),
+    },
     Case { name: "quad/nee", calls: CALLS, run: || next_event("quad") },
     Case { name: "window/sample", calls: CALLS, run: || sample("window") },
-    Case { name: "window/pdf", calls: CALLS, run: || of_samples("window", |lights, x, s| lights.at(x).pdf(&s.hit)) },
+    Case {
+        name: "window/pdf",
+        calls: CALLS,
+        run: || of_samples("window", |lights, x, s| lights.at(x).pdf(&s.hit().expect("a triangle"))),
+    },
     Case {
         name: "window/pdf_direction",
         calls: CALLS,
@@ -81,7 +90,25 @@ pub(crate) const ALL: &[Case] = &[
         calls: CALLS,
         run: || environment(|sky, u| sky.pdf(glam::Vec3::from(u).normalize())),
     },
+    Case {
+        name: "environment-light/at",
+        calls: CALLS,
+        run: || environment_light(|lights, x, _| black_box(&lights.at(x)).pmf(NONE)),
+    },
+    Case {
+        name: "environment-light/sample",
+        calls: CALLS,
+        run: || environment_light(|lights, x, u| lights.at(x).sample(u).map_or(0.0, |sample| sample.pdf)),
+    },
+    Case {
+        name: "environment-light/pdf",
+        calls: CALLS,
+        run: || environment_light(|lights, x, u| lights.at(x).pdf_environment(glam::Vec3::from(u) - 0.5)),
+    },
 ];
+
+/// A triangle that no workload has.
+const NONE: TriangleId = TriangleId::new(MeshId::from_index(u32::MAX), 0);
 
 /// Everything in here is counted, and nothing else.
 #[inline(never)]
@@ -219,5 +246,15 @@ fn environment(call: fn(&Environment, [f32; 3]) -> f32) {
     let numbers = numbers();
     measured(|i| {
         black_box(call(&sky, numbers[i]));
+    });
+}
+
+/// The sky of the workloads as the only light, at the points of the window.
+fn environment_light(call: fn(&LightSampler, &ShadingPoint, [f32; 3]) -> f32) {
+    let sky = scenes::sky::Sky::new().environment;
+    let lights = LightSampler::builder().environment(sky).environment_as_light().build().expect("the sky is a light");
+    let (points, numbers) = (scenes::scene("window").points.timing(CALLS), numbers());
+    measured(|i| {
+        black_box(call(&lights, &points[i], numbers[i]));
     });
 }

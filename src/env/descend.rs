@@ -44,16 +44,16 @@ impl EnvironmentView<'_> {
     }
 
     /// Draws a direction below a texel of a level in proportion to its radiance. Its density is that of
-    /// [`sample`](Self::sample), not given the texel.
+    /// [`sample`](Self::sample), not given the texel. The level may be below the finest, where directions are uniform.
     #[inline]
-    pub(super) fn sample_below(&self, level: u32, [mut x, mut y]: [u32; 2], u: &mut [Variate; 2]) -> EnvironmentSample {
-        let depth = self.header.depth;
-        for level in level..depth {
+    pub(crate) fn sample_below(&self, level: u32, [mut x, mut y]: [u32; 2], u: &mut [Variate; 2]) -> EnvironmentSample {
+        for level in level..self.header.depth {
             [x, y] = step(children(self.means, level, x, y), [x, y], u);
         }
+        let depth = self.header.depth.max(level);
         let point = Vec2::new(inside(depth, x, u[0].value_f32()), inside(depth, y, u[1].value_f32()));
         let direction = to_world(&self.header.rotation, square_to_sphere(point));
-        let radiance = self.mean_at(depth, x, y);
+        let radiance = self.mean_in(depth, [x, y]);
         EnvironmentSample { direction, radiance, pdf: self.pdf_of(radiance) }
     }
 
@@ -84,7 +84,7 @@ pub(super) fn inside(depth: u32, texel: u32, place: f32) -> f32 {
 /// Chooses one of the four texels below a texel in proportion to their weights: the second variate the row, the
 /// first one the column.
 #[inline]
-pub(super) fn step([a, b, c, d]: [f32; 4], [x, y]: [u32; 2], u: &mut [Variate; 2]) -> [u32; 2] {
+pub(crate) fn step([a, b, c, d]: [f32; 4], [x, y]: [u32; 2], u: &mut [Variate; 2]) -> [u32; 2] {
     let j = pick_pair([a + b, c + d], &mut u[1]);
     let i = pick_pair([[a, b], [c, d]][j], &mut u[0]);
     [2 * x + i as u32, 2 * y + j as u32]

@@ -17,6 +17,7 @@ mod image;
 mod lanes;
 mod lat_long;
 mod pyramid;
+mod regions;
 mod resample;
 mod rotation;
 mod source;
@@ -28,10 +29,12 @@ mod weighted;
 
 pub(crate) use cone::DirectionCone;
 pub use descend::EnvironmentSample;
+pub(crate) use descend::step;
 pub(crate) use feature_texel::FeatureTexel;
 pub(crate) use feature_tree::FeatureNode;
 pub use image::{EnvironmentImage, Poles};
 pub(crate) use lanes::texel_of;
+pub(crate) use regions::{REGION_DEPTH, REGIONS, RegionMoments, RegionSums, region_at, texel_cone, texel_solid_angle};
 pub use view::{Environment, EnvironmentView};
 pub(crate) use weighted::DirectionDistribution;
 

@@ -48,6 +48,18 @@ pub struct ShadingPoint {
 /// [`ShadingPoint::new`].
 const UNIT_TOLERANCE: f32 = 2e-3;
 
+impl Receiver {
+    /// Returns the same receiver in another frame.
+    #[inline]
+    pub(crate) fn map_normal(self, map: impl FnOnce(Vec3) -> Vec3) -> Self {
+        match self {
+            Self::Surface(normal) => Self::Surface(map(normal)),
+            Self::Transmissive(normal) => Self::Transmissive(map(normal)),
+            Self::Volume => Self::Volume,
+        }
+    }
+}
+
 impl ShadingPoint {
     /// Returns a point with any receiver.
     ///
@@ -138,6 +150,15 @@ pub(crate) trait ReceiverKind: Copy {
     /// Returns the mean weight of the directions of a cone. Zero only if all of them have the weight zero.
     fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32;
 
+    /// Writes the mean weights of many cones ([`mean_over_cone`](Self::mean_over_cone)), with axes by component.
+    #[inline(always)]
+    fn means_over_cones<const N: usize>(self, axes: &[[f32; N]; 3], sin_radii: &[f32; N], means: &mut [f32; N]) {
+        let [x, y, z] = axes;
+        for i in 0..N {
+            means[i] = self.mean_over_cone(Vec3::new(x[i], y[i], z[i]), sin_radii[i]);
+        }
+    }
+
     /// Returns what the weights of cells are made from.
     fn height_weights(self) -> HeightWeights;
 
@@ -200,6 +221,11 @@ impl ReceiverKind for Receiver {
     #[inline]
     fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32 {
         dispatch!(self, kind => kind.mean_over_cone(axis, sin_radius))
+    }
+
+    #[inline(always)]
+    fn means_over_cones<const N: usize>(self, axes: &[[f32; N]; 3], sin_radii: &[f32; N], means: &mut [f32; N]) {
+        dispatch!(self, kind => kind.means_over_cones(axes, sin_radii, means));
     }
 
     #[inline(always)]

@@ -40,7 +40,7 @@ impl ReceiverKind for Surface {
     }
 
     /// Exact for a cone above the horizon. A cone that the horizon cuts gets the mean of a linear ramp.
-    #[inline]
+    #[inline(always)]
     fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32 {
         let (cosine, above) = (self.normal.dot(axis), self.normal.dot(axis) + sin_radius);
         if cosine >= sin_radius { cosine } else { above.max(0.0) * above.max(0.0) / (4.0 * sin_radius) }

@@ -34,7 +34,7 @@ impl ReceiverKind for Transmissive {
     }
 
     /// The cosine of the axis, but no less than the mean of a cone whose axis lies in the plane.
-    #[inline]
+    #[inline(always)]
     fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32 {
         self.normal.dot(axis).abs().max(0.5 * sin_radius)
     }

@@ -32,7 +32,7 @@ impl ReceiverKind for Volume {
         false
     }
 
-    #[inline]
+    #[inline(always)]
     fn mean_over_cone(self, _axis: Vec3, _sin_radius: f32) -> f32 {
         1.0
     }

@@ -6,4 +6,4 @@ mod sample;
 
 pub use ids::{MeshId, TextureId, TriangleId};
 pub use image::{Filter, Wrap};
-pub use sample::{Hit, LightSample};
+pub use sample::{Hit, LightSample, SampledLight};

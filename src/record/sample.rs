@@ -22,27 +22,55 @@ impl Hit {
     }
 }
 
-/// A point on a light, drawn for a shading point.
+/// What a sample was drawn on.
+///
+/// More kinds of lights may follow: match with a wildcard, and treat what is unknown like a sample of zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SampledLight {
+    /// A point of a triangle.
+    Triangle(Hit),
+    /// A direction of the environment
+    /// ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)).
+    Environment,
+}
+
+/// A point on a light, or a direction of the environment, drawn for a shading point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LightSample {
-    /// Where on the lights the point lies.
-    pub hit: Hit,
-    /// World position of the point.
+    /// What was drawn: a point of a triangle, or a direction of the environment.
+    pub light: SampledLight,
+    /// World position of the point. For the environment, a position 10¹⁵ units away along the direction: behind everything
+    /// that a scene can hold.
     pub position: Vec3,
-    /// Unit normal of the triangle's front side (its vertices run counter-clockwise around it).
+    /// Unit normal of the triangle's front side (its vertices run counter-clockwise around it). For the environment, the
+    /// opposite of the direction.
     pub normal: Vec3,
     /// Unit direction from the shading point to the point.
     pub direction: Vec3,
-    /// Distance from the shading point to the point.
+    /// Distance from the shading point to the point. [`f32::INFINITY`] for the environment.
     pub distance: f32,
     /// Density of the point per solid angle at the shading point. Finite and above zero.
     ///
-    /// It counts this triangle alone. Where a ray can cross several portals, a host that evaluates all that
+    /// It counts this triangle alone, or the environment alone. Where a ray can cross several portals, a host that evaluates all that
     /// arrives along the direction divides by the density of the *direction* instead.
     pub pdf: f32,
-    /// Density of the same point per area of the light. Finite and above zero.
+    /// Density of the same point per area of the light. Finite and above zero. For the environment, per area of the unit
+    /// sphere, which is `pdf`.
     pub pdf_area: f32,
-    /// Probability (`pmf`) of having chosen the triangle. In `(0, 1]`.
+    /// Probability (`pmf`) of having chosen the triangle, or the environment. In `(0, 1]`.
     pub pmf: f32,
+}
+
+impl LightSample {
+    /// Returns the point of the triangle that was drawn; `None` for any other kind of light.
+    #[inline]
+    #[must_use]
+    pub const fn hit(&self) -> Option<Hit> {
+        match self.light {
+            SampledLight::Triangle(hit) => Some(hit),
+            SampledLight::Environment => None,
+        }
+    }
 }

@@ -5,7 +5,7 @@ use core::ops::ControlFlow;
 
 use super::lights::LightSampler;
 use crate::blas::{Procedural, Texture};
-use crate::env::Environment;
+use crate::env::{Environment, RegionMoments};
 use crate::error::Error;
 use crate::light::{Energies, Illumination, LightCollection, Mesh};
 use crate::parallel;
@@ -45,6 +45,7 @@ const PLACED: f64 = 0.9;
 pub struct LightSamplerBuilder<'a> {
     arity: Arity,
     environment: Option<Environment>,
+    environment_as_light: bool,
     illumination: Illumination,
     collection: LightCollection<'a>,
 }
@@ -56,6 +57,7 @@ impl fmt::Debug for LightSamplerBuilder<'_> {
         f.debug_struct("LightSamplerBuilder")
             .field("arity", &self.arity)
             .field("environment", &self.environment)
+            .field("environment_as_light", &self.environment_as_light)
             .field("illumination", &self.illumination)
             .field("textures", &textures)
             .field("meshes", &meshes)
@@ -76,6 +78,7 @@ impl<'a> LightSamplerBuilder<'a> {
         Self {
             arity: Arity::default(),
             environment: None,
+            environment_as_light: false,
             illumination: Illumination::default(),
             collection: LightCollection::new(),
         }
@@ -84,6 +87,20 @@ impl<'a> LightSamplerBuilder<'a> {
     /// Sets what the portals show.
     pub fn environment(mut self, environment: Environment) -> Self {
         self.environment = Some(environment);
+        self
+    }
+
+    /// Makes the environment one more light, next to the triangles: for scenes under the open sky, or with openings that
+    /// nobody has marked as portals. Off by default.
+    ///
+    /// A sample then is a point of a triangle or a direction of the environment ([`SampledLight`](crate::SampledLight)), chosen
+    /// by what each is estimated to send to the point. One call thus replaces [`PointSampler::sample`](crate::PointSampler::sample)
+    /// and [`Environment::sample`], and a path vertex needs one shadow ray instead of two. The estimate knows of no walls: where
+    /// all that is seen of the environment is seen through portals, leave this off.
+    ///
+    /// Without any triangle, the environment is the only light. A black environment is none.
+    pub fn environment_as_light(mut self) -> Self {
+        self.environment_as_light = true;
         self
     }
 
@@ -179,7 +196,9 @@ impl<'a> LightSamplerBuilder<'a> {
         let (tlas, order) = tlas::build(self.arity, emitting.len(), &bounds, &progress)?;
         let leaves = parallel::collect(order.len(), |leaf| emitting[order[leaf] as usize]);
         let lights = collection.into_lights(self.illumination, &leaves);
-        let mut sampler = LightSampler { tlas, lights, environment, cost: 1.0, cost_at_build: 1.0 };
+        let is_light = self.environment_as_light && environment.mean() > 0.0;
+        let sky = is_light.then(|| RegionMoments::new(&environment.as_view()));
+        let mut sampler = LightSampler { tlas, lights, environment, sky, cost: 1.0, cost_at_build: 1.0 };
         sampler.fit();
         sampler.cost_at_build = sampler.cost;
         progress.finish()?;

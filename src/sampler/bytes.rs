@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use super::lights::LightSamplerView;
 use crate::blas;
 use crate::buffers::{Section, Sections, write};
-use crate::env::EnvironmentView;
+use crate::env::{EnvironmentView, RegionMoments};
 use crate::error::{Error, ErrorKind};
 use crate::light::{Illumination, LightsView};
 use crate::technique::LightScene;
@@ -28,9 +28,10 @@ struct Parameters {
     illumination: u32,
     energy: f32,
     has_portals: u32,
-    padding: u32,
+    /// Whether the environment is a light: then its regions follow.
+    has_sky: u32,
     is_crossed_once: u32,
-    more_padding: u32,
+    padding: u32,
 }
 
 const _: () = assert!(size_of::<Parameters>() == 32);
@@ -40,21 +41,24 @@ impl Parameters {
     const VERSION: u32 = 2;
 }
 
+/// Tag and version of the section that holds the [`RegionMoments`].
+const REGIONS: ([u8; 4], u32) = (*b"EREG", 1);
+
 impl<'a> LightSamplerView<'a> {
     /// Returns everything as bytes, to be written to disk, mapped, shared or uploaded, and to be read by
     /// [`Self::from_bytes`] on a machine of the same byte order.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let LightScene { tlas, lights, environment } = &self.scene;
+        let LightScene { tlas, lights, environment, sky } = &self.scene;
         let parameters = [Parameters {
             light_arity: tlas.arity.code(),
             texture_arity: blas::ARITY as u32,
             illumination: lights.illumination as u32,
             energy: lights.energy,
             has_portals: lights.has_portals.into(),
-            padding: 0,
+            has_sky: sky.is_some().into(),
             is_crossed_once: lights.is_crossed_once.into(),
-            more_padding: 0,
+            padding: 0,
         }];
         let mut sections = Vec::new();
         sections.push(Section::new(Parameters::TAG, Parameters::VERSION, &parameters));
@@ -62,6 +66,9 @@ impl<'a> LightSamplerView<'a> {
         lights.append_sections(&mut sections);
         let header = [environment.header];
         environment.append_all_sections(&header, &mut sections);
+        if let Some(sky) = sky {
+            sections.push(Section::new(REGIONS.0, REGIONS.1, core::slice::from_ref(*sky)));
+        }
         write(&sections)
     }
 
@@ -74,13 +81,15 @@ impl<'a> LightSamplerView<'a> {
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut sections = Sections::new(bytes)?;
         let parameters: Parameters = sections.take_value(Parameters::TAG, Parameters::VERSION, "parameters")?;
-        let Parameters { light_arity, texture_arity, illumination, energy, has_portals, is_crossed_once, .. } =
-            parameters;
+        let Parameters {
+            light_arity, texture_arity, illumination, energy, has_portals, has_sky, is_crossed_once, ..
+        } = parameters;
         if texture_arity as usize != blas::ARITY {
             let expected = const { &[blas::ARITY as u32] };
             return Err(Error(ErrorKind::Arity { what: "a tree over a texture", found: texture_arity, expected }));
         }
         Error::unless_equal("mark of portals", (has_portals & !1) as usize, 0)?;
+        Error::unless_equal("mark of the environment", (has_sky & !1) as usize, 0)?;
         Error::unless_equal("mark of single crossings", (is_crossed_once & !1) as usize, 0)?;
         let arity = Arity::from_code(light_arity).ok_or_else(|| {
             let expected = const { &[Arity::Four.code(), Arity::Eight.code(), Arity::Sixteen.code()] };
@@ -95,10 +104,22 @@ impl<'a> LightSamplerView<'a> {
         let lights =
             LightsView::from_sections(&mut sections, illumination, energy, has_portals != 0, is_crossed_once != 0)?;
         let environment = EnvironmentView::from_all_sections(&mut sections)?;
+        let sky = if has_sky == 0 { None } else { Some(take_regions(&mut sections)?) };
         sections.end()?;
         tlas.validate()?;
         lights.validate()?;
         Error::unless_equal("number of lights", lights.len(), tlas.leaves.len())?;
-        Ok(Self { scene: LightScene { tlas, lights, environment } })
+        Ok(Self { scene: LightScene { tlas, lights, environment, sky } })
+    }
+}
+
+/// Takes the section of the regions, and checks them.
+fn take_regions<'a>(sections: &mut Sections<'a>) -> Result<&'a RegionMoments, Error> {
+    match sections.take::<RegionMoments>(REGIONS.0, REGIONS.1, "regions of the environment")? {
+        [regions] => {
+            regions.validate()?;
+            Ok(regions)
+        }
+        several => Err(Error::bytes("regions of the environment", 0, several.len(), 1u64)),
     }
 }

@@ -46,6 +46,9 @@ pub struct EmissionSample {
 /// its power, with cosine-distributed directions. For portals to an image, a direction is drawn by radiance times the
 /// area that all portals turn towards it, then a point by transmittance and that area.
 ///
+/// An environment that is a light itself ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)) sends no
+/// photons here but through portals: where they would start depends on the extent of the host's scene.
+///
 /// Made by [`LightSampler::emission`](crate::LightSampler::emission) in some microseconds; holds about 1.5 KB. Make it again
 /// after the environment has been rotated.
 #[derive(Clone, Debug)]

@@ -1,11 +1,12 @@
 //! All lights of a scene, owned or borrowed.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::builder::LightSamplerBuilder;
 use super::emission::Emission;
 use super::point::PointSampler;
-use crate::env::{Environment, EnvironmentView};
+use crate::env::{Environment, EnvironmentView, RegionMoments};
 use crate::error::Error;
 use crate::light::Lights;
 use crate::receiver::ShadingPoint;
@@ -21,6 +22,8 @@ pub struct LightSampler {
     pub(super) tlas: Tlas,
     pub(super) lights: Lights,
     pub(super) environment: Environment,
+    /// What the regions of the environment send, if it is a light itself and not black.
+    pub(super) sky: Option<Box<RegionMoments>>,
     /// Cost of the tree now: see [`Self::decay`].
     pub(super) cost: f64,
     /// Cost of the tree as it was built.
@@ -43,7 +46,7 @@ pub struct ByteSizes {
     pub lights: usize,
     /// Trees over textures.
     pub texture_trees: usize,
-    /// Environment.
+    /// Environment, and what it needs as a light.
     pub environment: usize,
 }
 
@@ -66,7 +69,7 @@ impl LightSampler {
     #[must_use]
     pub fn as_view(&self) -> LightSamplerView<'_> {
         let (tlas, lights, environment) = (self.tlas.view(), self.lights.view(), self.environment.as_view());
-        LightSamplerView { scene: LightScene { tlas, lights, environment } }
+        LightSamplerView { scene: LightScene { tlas, lights, environment, sky: self.sky.as_deref() } }
     }
 
     /// Returns the lights as seen from a shading point.
@@ -77,6 +80,7 @@ impl LightSampler {
                 tlas: self.tlas.view(),
                 lights: self.lights.view(),
                 environment: self.environment.as_view(),
+                sky: self.sky.as_deref(),
             },
             x: *x,
         })
@@ -153,7 +157,7 @@ impl<'a> LightSamplerView<'a> {
             light_tree: self.scene.tlas.byte_size(),
             lights: self.scene.lights.byte_size() - texture_trees,
             texture_trees,
-            environment: self.scene.environment.byte_size(),
+            environment: self.scene.environment.byte_size() + self.scene.sky.map_or(0, size_of_val),
         }
     }
 }

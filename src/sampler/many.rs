@@ -18,8 +18,8 @@ impl LightSamplerView<'_> {
     /// The samples are those that [`PointSampler::sample`] draws, but faster: a walk down a large tree mostly waits for
     /// memory, and here several walks are interleaved. Where one slice is longer, the rest of it is left alone.
     pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        // With bright features a sample is mostly the search for them.
-        if self.scene.has_features() {
+        // With bright features a sample is mostly the search for them, and with the environment as a light walks are few.
+        if self.scene.has_features() || self.scene.sky.is_some() {
             let each = queries.iter().zip(samples);
             return each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));
         }
@@ -41,7 +41,7 @@ impl LightSamplerView<'_> {
             self.scene.lights.light(leaf).prefetch();
         }
         let Some((first, _)) = queries.first() else { return };
-        // Without features, nothing but the point differs.
+        // Without these, nothing but the point differs.
         let mut at = self.at(first);
         for (i, sample) in samples.iter_mut().enumerate().take(walks.len()) {
             at.move_to(&queries[i].0);

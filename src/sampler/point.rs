@@ -5,10 +5,16 @@ use glam::Vec3;
 use super::finite::{to_finite, to_positive};
 use crate::light::{LightPoint, LightView, LightViewKind};
 use crate::receiver::ShadingPoint;
-use crate::record::{Hit, LightSample, TriangleId};
-use crate::technique::{Drawn, Mixed, Mixture, Variates, Viewpoint};
+use crate::record::{Hit, LightSample, SampledLight, TriangleId};
+use crate::technique::{Drawn, Mixed, Mixture, SkyDirection, Variates, Viewpoint};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
+
+/// Distance of the positions of samples of the environment. Chosen: beyond the largest coordinate of a light, 1e9, and of a
+/// shading point, 1e15, and its square is a finite `f32`.
+///
+/// Larger: hosts that square the distance overflow. Smaller: the position could lie in front of something.
+const ENVIRONMENT_DISTANCE: f32 = 1e15;
 
 /// The lights as seen from one shading point: made by [`LightSampler::at`](crate::LightSampler::at).
 ///
@@ -27,7 +33,9 @@ impl<'a> PointSampler<'a> {
     /// To be called with a literal, and itself a literal: what goes through a variable is copied, and a sampler is large.
     #[inline(always)]
     pub(super) fn new(at: Viewpoint<'a>) -> Self {
-        Self { mixture: Mixture::new(&at), at }
+        let mut sampler = Self { mixture: Mixture::of_trees(), at };
+        sampler.mixture.look_beside(&sampler.at);
+        sampler
     }
 
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the
@@ -38,7 +46,27 @@ impl<'a> PointSampler<'a> {
     #[must_use]
     pub fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
         let mixed = self.mixture.one();
-        mixed.sample(&self.at, Variates::new(u), |drawn, view| light_sample(&self.at, drawn, view))
+        let mut variates = Variates::new(u);
+        if mixed.chooses_sky(&mut variates.choice) {
+            return self.sample_environment(&mixed, variates.point);
+        }
+        mixed.sample(&self.at, variates, |drawn, view| light_sample(&self.at, drawn, view))
+    }
+
+    /// Draws a direction of the environment as a light.
+    fn sample_environment(&self, mixed: &Mixed<'_>, u: [Variate; 2]) -> Option<LightSample> {
+        let SkyDirection { direction, pdf } = mixed.sample_sky(&self.at, u)?;
+        let pdf = to_positive(pdf);
+        Some(LightSample {
+            light: SampledLight::Environment,
+            position: self.at.x.position + direction * ENVIRONMENT_DISTANCE,
+            normal: -direction,
+            direction,
+            distance: f32::INFINITY,
+            pdf,
+            pdf_area: pdf,
+            pmf: to_positive(mixed.sky_pmf()),
+        })
     }
 
     /// Draws a point on a light that the tree has chosen.
@@ -61,6 +89,17 @@ impl<'a> PointSampler<'a> {
         self.pdf_of_hit(hit, &self.mixture.one())
     }
 
+    /// Returns the density per solid angle with which [`Self::sample`] draws this direction of the environment, where that is
+    /// a light ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)). Zero where it cannot; never
+    /// infinite. `direction` need not have unit length.
+    ///
+    /// In a scene without portals, this is the density of a ray that has left the scene. It counts no triangles: where the
+    /// ray can cross portals, what a host needs is [`Self::pdf_direction`].
+    #[must_use]
+    pub fn pdf_environment(&self, direction: Vec3) -> f32 {
+        to_finite(self.environment_density(direction, &self.mixture.one()))
+    }
+
     /// Returns the probability with which the trees choose this triangle, in `[0, 1]`.
     ///
     /// Samples towards bright features of the environment that are visible through portals are not counted. Without any,
@@ -72,11 +111,13 @@ impl<'a> PointSampler<'a> {
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] goes in a direction: the sum over all points of all
-    /// lights that the ray from the shading point crosses, which the crate finds by its own traversal. `direction` need not
-    /// have unit length.
+    /// lights that the ray from the shading point crosses, which the crate finds by its own traversal, and the environment if
+    /// it is a light. `direction` need not have unit length.
     #[must_use]
     pub fn pdf_direction(&self, direction: Vec3) -> f32 {
-        to_finite(self.direction_density(direction, None, &self.mixture.one()))
+        let mixed = self.mixture.one();
+        let triangles = self.direction_density(direction, None, &mixed);
+        to_finite(triangles + self.environment_density(direction, &mixed))
     }
 
     /// Returns [`Self::pdf_direction`] of a sample's own direction.
@@ -87,16 +128,21 @@ impl<'a> PointSampler<'a> {
     /// the result is `sample.pdf`.
     #[must_use]
     pub fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
-        if self.at.scene.lights.is_crossed_once {
-            return sample.pdf;
-        }
-        let own = self.at.scene.lights.leaf(sample.hit.triangle);
-        let others = self.direction_density(sample.direction, own, &self.mixture.one());
-        to_finite(f64::from(sample.pdf) + others)
+        let mixed = self.mixture.one();
+        let (own, environment) = match sample.light {
+            SampledLight::Triangle(hit) => {
+                (self.at.scene.lights.leaf(hit.triangle), self.environment_density(sample.direction, &mixed))
+            }
+            SampledLight::Environment => (None, 0.0),
+        };
+        let is_alone = own.is_some() && self.at.scene.lights.is_crossed_once;
+        let others = if is_alone { 0.0 } else { self.direction_density(sample.direction, own, &mixed) };
+        to_finite(f64::from(sample.pdf) + others + environment)
     }
 
     /// Draws one point from each part of the light tree that adaptive splitting visits (Conty Estevez and Kulla 2018,
-    /// section 5.4), and one towards a bright feature of the environment if any is visible, and adds them to `samples`.
+    /// section 5.4), one towards a bright feature of the environment if any is visible through a portal, and one direction of
+    /// the environment if that is a light, and adds them to `samples`.
     ///
     /// The estimate is the *sum* of `f / pdf` over the samples: `pdf` and `pdf_area` are expected densities, the expected
     /// number of samples per measure, and `pmf` is the expected number on that triangle. Nothing is allocated but by
@@ -126,6 +172,8 @@ impl<'a> PointSampler<'a> {
         let last = u32::MAX >> 2;
         let numbers = Variates { choice: variate(last, 0), point: [variate(last, 1), variate(last, 2)] };
         samples.extend(mixed.sample_feature(&self.at, numbers, |drawn, view| light_sample(&self.at, drawn, view)));
+        let last = last - 1;
+        samples.extend(self.sample_environment(mixed, [variate(last, 1), variate(last, 2)]));
     }
 
     /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a point of a triangle, for
@@ -135,11 +183,20 @@ impl<'a> PointSampler<'a> {
         self.pdf_of_hit(hit, &self.mixture.side_by_side(splitting))
     }
 
+    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a direction of the environment,
+    /// where that is a light.
+    #[must_use]
+    pub fn pdf_split_environment(&self, direction: Vec3, splitting: &Splitting) -> f32 {
+        to_finite(self.environment_density(direction, &self.mixture.side_by_side(splitting)))
+    }
+
     /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] in a direction: the sum over
-    /// all points that the ray crosses.
+    /// all points that the ray crosses, and the environment if it is a light.
     #[must_use]
     pub fn pdf_split_direction(&self, direction: Vec3, splitting: &Splitting) -> f32 {
-        to_finite(self.direction_density(direction, None, &self.mixture.side_by_side(splitting)))
+        let mixed = self.mixture.side_by_side(splitting);
+        let triangles = self.direction_density(direction, None, &mixed);
+        to_finite(triangles + self.environment_density(direction, &mixed))
     }
 
     fn pdf_of_hit(&self, hit: &Hit, mixed: &Mixed<'_>) -> f32 {
@@ -147,6 +204,15 @@ impl<'a> PointSampler<'a> {
         let view = &self.at.view(leaf);
         let Some(view) = view else { return 0.0 };
         to_finite(mixed.density(&self.at, LightPoint::new(leaf, hit.barycentrics), view))
+    }
+
+    /// Density of a direction by the environment as a light.
+    fn environment_density(&self, direction: Vec3, mixed: &Mixed<'_>) -> f64 {
+        if self.at.scene.sky.is_none() {
+            return 0.0;
+        }
+        let unit = direction.as_dvec3().normalize_or_zero().as_vec3();
+        if unit == Vec3::ZERO { 0.0 } else { mixed.sky_density(&self.at, unit) }
     }
 
     /// Sum of the densities of all points along a ray, except those of one light.
@@ -173,7 +239,10 @@ fn light_sample(at: &Viewpoint<'_>, drawn: &Drawn, view: &LightView<'_>) -> Opti
     let distance = relative.length();
     let positive = drawn.pdf > 0.0 && distance > 0.0 && distance.is_finite();
     positive.then(|| LightSample {
-        hit: Hit { triangle: at.scene.lights.id(drawn.point.leaf), barycentrics: drawn.point.point.to_barycentrics() },
+        light: SampledLight::Triangle(Hit {
+            triangle: at.scene.lights.id(drawn.point.leaf),
+            barycentrics: drawn.point.point.to_barycentrics(),
+        }),
         position: (at.x.position.as_dvec3() + relative).as_vec3(),
         normal: view.normal(),
         direction: (relative / distance).as_vec3(),

@@ -1,10 +1,12 @@
 //! The techniques at one shading point: how often each is used, and the density of all together.
 
 use super::features::VisibleFeatures;
+use super::sky::{Sky, SkyDirection};
 use super::trees::{self, Trees};
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
+use crate::env::RegionMoments;
 use crate::light::{LightPoint, LightView};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::{Variate, pick_pair};
@@ -25,6 +27,13 @@ const LEAST_TREES_CLOSE: f32 = 0.2;
 /// Largest estimate of an irradiance, so that sums of two stay finite. Proved: twice this is below `f32::MAX`.
 const MAX_IRRADIANCE: f32 = 1e35;
 
+/// Least probability of the environment next to the lights, and of the lights next to the environment. Estimates know of no
+/// walls: the environment may be all but hidden where a lamp is not, and a lamp where the environment is not.
+///
+/// Measured on the host bench's street (docs/CONSTANTS.md). A larger value wastes samples where one of both outshines the
+/// other; with a smaller one, what is dark by the estimates alone is noisier, by the inverse of this.
+const LEAST_BESIDE: f64 = 0.1;
+
 /// The techniques at one shading point, as far as they have been found out once for all questions.
 #[derive(Debug)]
 pub(crate) struct Mixture {
@@ -34,6 +43,8 @@ pub(crate) struct Mixture {
     features: Option<VisibleFeatures>,
     /// Estimate of the irradiance that the trees account for.
     rest: f32,
+    /// The environment, if it is a light and anything can arrive from it.
+    sky: Option<Sky>,
     shares: Shares,
 }
 
@@ -44,6 +55,8 @@ struct Shares {
     trees: f64,
     /// Probability of the features over the irradiance from them; 0 if none is visible.
     features: f64,
+    /// Probability of the environment as a light.
+    sky: f64,
 }
 
 /// A point on a light with its density by all techniques together.
@@ -66,35 +79,63 @@ impl Drawn {
 }
 
 impl Mixture {
-    /// Finds out what each technique accounts for at a shading point.
+    /// Finds out what there is besides the trees.
     #[inline(always)]
-    pub(crate) fn new(at: &Viewpoint<'_>) -> Self {
-        if at.scene.has_features() { Self::balanced(at) } else { Self::of_trees() }
+    pub(crate) fn look_beside(&mut self, at: &Viewpoint<'_>) {
+        if at.scene.has_features() {
+            self.add_features(at);
+        }
+        if let Some(regions) = at.scene.sky {
+            self.add_sky(at, regions);
+        }
     }
 
     /// The trees alone.
     #[inline(always)]
-    fn of_trees() -> Self {
-        Self { first: None, features: None, rest: 1.0, shares: Shares { trees: 1.0, features: 0.0 } }
+    pub(crate) fn of_trees() -> Self {
+        let shares = Shares { trees: 1.0, features: 0.0, sky: 0.0 };
+        Self { first: None, features: None, rest: 1.0, sky: None, shares }
     }
 
-    /// Looks for features, and balances them with the trees. Returned as a whole, so that it is built in its place: it is
-    /// large, and most of it is seldom written.
+    /// Looks for features, and balances them with the trees. In place: the list of features is large, and most of it is
+    /// seldom written.
     #[inline(never)]
-    fn balanced(at: &Viewpoint<'_>) -> Self {
-        let mut features = VisibleFeatures::default();
+    fn add_features(&mut self, at: &Viewpoint<'_>) {
+        let features = self.features.insert(VisibleFeatures::default());
         features.find(at);
         let seen = features.irradiance();
         if !(seen > 0.0 && seen < MAX_IRRADIANCE) {
-            return Self::of_trees();
+            self.features = None;
+            return;
         }
         let least = if features.is_close() { LEAST_TREES_CLOSE } else { LEAST_TREES };
-        let first = at.scene.tlas.first_weights(at);
-        let rest = trees::irradiance(at, first.as_ref());
-        let rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
-        let total = f64::from(seen) + f64::from(rest);
-        let shares = Shares { trees: f64::from(rest) / total, features: 1.0 / total };
-        Self { first, features: Some(features), rest, shares }
+        self.first = at.scene.tlas.first_weights(at);
+        let rest = trees::irradiance(at, self.first.as_ref());
+        self.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
+        let total = f64::from(seen) + f64::from(self.rest);
+        self.shares = Shares { trees: f64::from(self.rest) / total, features: 1.0 / total, sky: 0.0 };
+    }
+
+    /// Balances all that lights send with what the environment sends as a light.
+    #[inline(never)]
+    fn add_sky(&mut self, at: &Viewpoint<'_>, regions: &RegionMoments) {
+        self.sky = Sky::new(at, regions);
+        let Some(sky) = &self.sky else { return };
+        let lights = match &self.features {
+            Some(features) => features.total() + f64::from(self.rest),
+            None => {
+                self.first = at.scene.tlas.first_weights(at);
+                f64::from(trees::irradiance(at, self.first.as_ref()).min(MAX_IRRADIANCE))
+            }
+        };
+        let share = if lights > 0.0 {
+            let of_all = f64::from(sky.irradiance()) / (f64::from(sky.irradiance()) + lights);
+            LEAST_BESIDE + (1.0 - 2.0 * LEAST_BESIDE) * of_all
+        } else {
+            1.0
+        };
+        let Shares { trees, features, .. } = self.shares;
+        self.shares = Shares { trees: (1.0 - share) * trees, features: (1.0 - share) * features, sky: share };
     }
 
     /// Returns the mixture for single samples: one technique is chosen.
@@ -103,11 +144,12 @@ impl Mixture {
         Mixed { trees: Trees { first: self.first.as_ref(), splitting: None }, mixture: self, shares: self.shares }
     }
 
-    /// Returns the mixture for a split tree: the trees in any case, and one feature next to them.
+    /// Returns the mixture for a split tree: the trees in any case, and next to them one feature and one direction of the
+    /// environment, if that is a light.
     pub(crate) fn side_by_side<'m>(&'m self, splitting: &'m Splitting) -> Mixed<'m> {
         let features = self.features.as_ref().map_or(0.0, |features| 1.0 / features.total());
         let trees = Trees { first: self.first.as_ref(), splitting: Some(splitting) };
-        Mixed { trees, mixture: self, shares: Shares { trees: 1.0, features } }
+        Mixed { trees, mixture: self, shares: Shares { trees: 1.0, features, sky: 1.0 } }
     }
 }
 
@@ -120,6 +162,30 @@ pub(crate) struct Mixed<'m> {
 }
 
 impl Mixed<'_> {
+    /// Chooses between the environment as a light and the lights. Returns whether it is the environment.
+    #[inline(always)]
+    pub(crate) fn chooses_sky(&self, choice: &mut Variate) -> bool {
+        let share = self.shares.sky as f32;
+        self.mixture.sky.is_some() && pick_pair([share, 1.0 - share], choice) == 0
+    }
+
+    /// Probability of the environment as a light, or the expected number of directions.
+    pub(crate) fn sky_pmf(&self) -> f64 {
+        self.mixture.sky.map_or(0.0, |_| self.shares.sky)
+    }
+
+    /// Draws a direction of the environment as a light, if anything can arrive from it.
+    #[inline(never)]
+    pub(crate) fn sample_sky(&self, at: &Viewpoint<'_>, u: [Variate; 2]) -> Option<SkyDirection> {
+        let SkyDirection { direction, pdf } = self.mixture.sky.as_ref()?.sample(at, u)?;
+        Some(SkyDirection { direction, pdf: self.shares.sky * pdf })
+    }
+
+    /// Returns the density of a unit direction by the environment as a light.
+    pub(crate) fn sky_density(&self, at: &Viewpoint<'_>, direction: Vec3) -> f64 {
+        self.mixture.sky.as_ref().map_or(0.0, |sky| self.shares.sky * sky.pdf(at, direction))
+    }
+
     /// Draws a point on a light by one of the techniques.
     #[inline(always)]
     pub(crate) fn sample<R>(

@@ -2,6 +2,7 @@
 
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
 use crate::light::{DrawnPoint, LightPoint, LightView, LightViewKind};
+use crate::math::{at_least, only_if};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::Variate;
 
@@ -70,7 +71,9 @@ impl Technique for Trees<'_> {
 /// of the tree's first choice, if the tree has nodes. Zero only where nothing can arrive.
 pub(super) fn irradiance(at: &Viewpoint<'_>, first: Option<&FirstWeights>) -> f32 {
     if let Some(first) = first {
-        return at.scene.lights.energy * first.sum();
+        let (energy, sum) = (at.scene.lights.energy, first.sum());
+        // Positive whatever underflows.
+        return only_if(energy > 0.0 && sum > 0.0, at_least(energy * sum, f32::MIN_POSITIVE));
     }
     // A tree without nodes has one light, or none.
     if at.scene.lights.is_empty() {

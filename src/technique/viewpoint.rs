@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::blas::Lattice;
-use crate::env::EnvironmentView;
+use crate::env::{EnvironmentView, RegionMoments};
 use crate::light::{LightKind, LightView, LightsView};
 use crate::math::{at_least, only_if};
 use crate::receiver::ShadingPoint;
@@ -18,6 +18,8 @@ pub(crate) struct LightScene<'a> {
     pub(crate) lights: LightsView<'a>,
     /// What the portals show.
     pub(crate) environment: EnvironmentView<'a>,
+    /// What the regions of the environment send, if the environment is a light itself and not black.
+    pub(crate) sky: Option<&'a RegionMoments>,
 }
 
 impl<'a> LightScene<'a> {

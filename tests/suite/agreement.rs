@@ -51,14 +51,14 @@ impl Counts {
 
     fn check(&mut self, at: &dyn Point, x: &ShadingPoint, sample: &LightSample) {
         self.samples += 1;
-        let pdf = at.pdf(&sample.hit);
+        let pdf = at.pdf(&sample.hit().expect("a triangle"));
         let difference = (f64::from(pdf) / f64::from(sample.pdf) - 1.0).abs();
         self.worst = self.worst.max(difference);
         if differs(pdf, sample.pdf, TOLERANCE) {
             self.mismatches += 1;
             self.first.get_or_insert_with(|| format!("{sample:?} at {x:?}: pdf {pdf}"));
         }
-        let [b1, b2] = sample.hit.barycentrics;
+        let [b1, b2] = sample.hit().expect("a triangle").barycentrics;
         let finite = sample.position.is_finite() && sample.direction.is_normalized() && sample.normal.is_normalized();
         let positive = [sample.pdf, sample.pdf_area, sample.pmf, sample.distance, b1, b2, 1.0 - b1 - b2];
         let in_range = |value: &f32| value.is_finite() && *value >= 0.0;
@@ -70,7 +70,7 @@ impl Counts {
 
     fn check_direction(&mut self, at: &dyn Point, x: &ShadingPoint, sample: &LightSample) {
         self.directions += 1;
-        if differs(at.pmf(sample.hit.triangle), sample.pmf, TOLERANCE) {
+        if differs(at.pmf(sample.hit().expect("a triangle").triangle), sample.pmf, TOLERANCE) {
             self.mismatches += 1;
             self.first.get_or_insert_with(|| format!("{sample:?} at {x:?}: pmf"));
         }
@@ -176,7 +176,7 @@ fn split_samples_have_the_density_that_pdf_split_finds() {
                 most = most.max(samples.len());
                 for sample in samples.iter().take(50) {
                     count += 1;
-                    let pdf = lights.at(&x).pdf_split(&sample.hit, &splitting);
+                    let pdf = lights.at(&x).pdf_split(&sample.hit().expect("a triangle"), &splitting);
                     assert!(!differs(pdf, sample.pdf, TOLERANCE), "{sample:?} at {x:?} with {splitting:?}: {pdf}");
                 }
             }
@@ -212,7 +212,14 @@ fn samples_are_reproducible_to_the_bit() {
         sample.map(|s| {
             let [p, n, d] = [s.position, s.normal, s.direction].map(|v| v.to_array().map(f32::to_bits));
             let scalars = [s.distance, s.pdf, s.pdf_area, s.pmf].map(f32::to_bits);
-            (s.hit.triangle, s.hit.barycentrics.map(f32::to_bits), p, n, d, scalars)
+            (
+                s.hit().expect("a triangle").triangle,
+                s.hit().expect("a triangle").barycentrics.map(f32::to_bits),
+                p,
+                n,
+                d,
+                scalars,
+            )
         })
     };
     let mut lit = 0;

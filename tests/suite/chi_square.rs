@@ -38,9 +38,9 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     for _ in 0..samples {
         match lights.at(&x).sample(pcg.cube()) {
             Some(sample) => {
-                let triangle =
-                    firsts[sample.hit.triangle.mesh.index() as usize] + sample.hit.triangle.triangle as usize;
-                let count = &mut observed[triangle * bins + bin(sample.hit.barycentrics, DEPTH)];
+                let triangle = firsts[sample.hit().expect("a triangle").triangle.mesh.index() as usize]
+                    + sample.hit().expect("a triangle").triangle.triangle as usize;
+                let count = &mut observed[triangle * bins + bin(sample.hit().expect("a triangle").barycentrics, DEPTH)];
                 *count += 1.0;
                 if *count <= PROBES {
                     kept.push(sample);
@@ -136,7 +136,7 @@ fn triangles_are_chosen_with_their_probability() {
         let triangles: Vec<_> = scene.triangles().map(id).collect();
         let mut observed = vec![0.0; triangles.len() + 1];
         for _ in 0..samples {
-            let chosen = lights.at(&x).sample(pcg.cube()).map(|sample| sample.hit.triangle);
+            let chosen = lights.at(&x).sample(pcg.cube()).map(|sample| sample.hit().expect("a triangle").triangle);
             let place = chosen.map_or(Ok(triangles.len()), |chosen| triangles.binary_search(&chosen));
             observed[place.expect("the triangle is one of the scene's")] += 1.0;
         }
@@ -175,7 +175,7 @@ fn splitting_visits_triangles_as_often_as_it_expects() {
         for _ in 0..rounds {
             let samples = sample_split(&lights.at(&x), pcg.cube(), &splitting);
             drawn += samples.len();
-            let mut visited: Vec<_> = samples.iter().map(|sample| sample.hit.triangle).collect();
+            let mut visited: Vec<_> = samples.iter().map(|sample| sample.hit().expect("a triangle").triangle).collect();
             visited.sort_unstable();
             assert!(visited.windows(2).all(|pair| pair[0] != pair[1]), "a triangle is visited twice");
             for triangle in visited {
@@ -233,7 +233,7 @@ fn equal_lights_are_chosen_equally_often_at_any_depth() {
     let n = 400_000;
     for _ in 0..n {
         let sample = lights.at(&x).sample(pcg.cube()).expect("every light is visible");
-        observed[sample.hit.triangle.triangle as usize] += 1.0;
+        observed[sample.hit().expect("a triangle").triangle.triangle as usize] += 1.0;
     }
     let expected: Vec<_> = scene.triangles().map(|t| f64::from(n) * f64::from(lights.at(&x).pmf(id(t)))).collect();
     let (p, dump) = chi_square(&observed, &expected);

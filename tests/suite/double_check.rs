@@ -92,7 +92,7 @@ fn examine(number: usize) -> Counts {
             let u = if i % 4 == 0 { core::array::from_fn(|_| hostile(&mut pcg)) } else { pcg.cube() };
             counts.samples += 1;
             match at.sample(u) {
-                Some(sample) => counts.check(number, &x, &sample, at.pdf(&sample.hit)),
+                Some(sample) => counts.check(number, &x, &sample, at.pdf(&sample.hit().expect("a triangle"))),
                 None => counts.none += 1,
             }
         }
@@ -144,7 +144,7 @@ fn a_wrong_density_is_a_mismatch() {
             found += 1;
             counts.check(2, x, &sample, sample.pdf * (1.0 + 2.0 * TOLERANCE as f32));
             counts.check(2, x, &sample, f32::NAN);
-            counts.check(2, x, &sample, at.pdf(&sample.hit));
+            counts.check(2, x, &sample, at.pdf(&sample.hit().expect("a triangle")));
         }
     }
     assert!(found > 10 && counts.mismatches == 2 * found && counts.log.len() == 2 * found as usize);

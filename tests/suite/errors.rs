@@ -186,8 +186,8 @@ fn exercise(view: &View<'_>, x: &ShadingPoint, u: [f32; 3]) -> usize {
     let check = |sample: &LightSample| {
         [sample.pdf, sample.pdf_area, sample.pmf].into_iter().for_each(finite);
         assert!(sample.pdf > 0.0 && sample.pdf_area > 0.0 && sample.pmf > 0.0, "{sample:?}");
-        finite(view.at(x).pdf(&sample.hit));
-        finite(view.at(x).pdf_split(&sample.hit, &splitting));
+        finite(view.at(x).pdf(&sample.hit().expect("a triangle")));
+        finite(view.at(x).pdf_split(&sample.hit().expect("a triangle"), &splitting));
         finite(view.at(x).pdf_sample_direction(sample));
         assert!(!sample.position.is_nan() && sample.direction.is_finite() && sample.distance.is_finite());
     };

@@ -31,9 +31,9 @@ impl Hash {
     }
 
     fn add_sample(&mut self, sample: &LightSample) {
-        let id = sample.hit.triangle;
+        let id = sample.hit().expect("a triangle").triangle;
         self.add(&[f32::from_bits(id.mesh.index()), f32::from_bits(id.triangle)]);
-        self.add(&sample.hit.barycentrics);
+        self.add(&sample.hit().expect("a triangle").barycentrics);
         [sample.position, sample.normal, sample.direction].iter().for_each(|v| self.add(&v.to_array()));
         self.add(&[sample.distance, sample.pdf, sample.pdf_area, sample.pmf]);
     }
@@ -48,7 +48,11 @@ fn ask(lights: &LightSampler, x: &ShadingPoint, pcg: &mut Pcg32, hash: &mut Hash
     let single = at.sample(u);
     for sample in single.iter().chain(split.iter().take(8)) {
         hash.add_sample(sample);
-        hash.add(&[at.pdf(&sample.hit), at.pmf(sample.hit.triangle), lights.at(x).pdf_split(&sample.hit, &splitting)]);
+        hash.add(&[
+            at.pdf(&sample.hit().expect("a triangle")),
+            at.pmf(sample.hit().expect("a triangle").triangle),
+            lights.at(x).pdf_split(&sample.hit().expect("a triangle"), &splitting),
+        ]);
         hash.add(&[at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
     }
     hash.add(&[at.pdf_direction(pcg.direction()), at.pmf(TriangleId::new(MeshId::from_index(0), 0))]);

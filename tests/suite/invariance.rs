@@ -144,8 +144,11 @@ fn scene(number: usize, triangles: usize) -> (Scene, Pcg32) {
 
 /// What a sample's point sends to `x` times the cosine there, and the lesser of the cosines at either end.
 fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> (f64, f64) {
-    let (m, t) = (sample.hit.triangle.mesh.index() as usize, sample.hit.triangle.triangle as usize);
-    let b = sample.hit.barycentrics.map(f64::from);
+    let (m, t) = (
+        sample.hit().expect("a triangle").triangle.mesh.index() as usize,
+        sample.hit().expect("a triangle").triangle.triangle as usize,
+    );
+    let b = sample.hit().expect("a triangle").barycentrics.map(f64::from);
     let [v0, v1, v2] = scene.meshes[m].vertices(t).map(|v| v.as_dvec3() - x.position.as_dvec3());
     let direction = (v0 * (1.0 - b[0] - b[1]) + v1 * b[0] + v2 * b[1]).normalize();
     let (here, there) = (oracle::cosine(&x.receiver, direction), (v1 - v0).cross(v2 - v0).normalize().dot(direction));
@@ -169,7 +172,7 @@ fn what_can_be_drawn_can_be_drawn_in_the_changed_scene() {
                     let (value, cosine) = contribution(&scene, &x, &sample);
                     if value > 0.0 && cosine > GRAZING {
                         counted += 1;
-                        let found = other.at(&changed.x).pdf(&(changed.hit)(sample.hit));
+                        let found = other.at(&changed.x).pdf(&(changed.hit)(sample.hit().expect("a triangle")));
                         assert!(found > 0.0, "{} {name}: {sample:?} from {x:?}", scene.name);
                     }
                 }
@@ -202,7 +205,9 @@ fn the_density_of_one_triangle_moves_with_it() {
                     let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
                     let (value, cosine) = contribution(&scene, &x, &sample);
                     if value > 0.0 && cosine > GRAZING {
-                        ratios.push(f64::from(other.at(&changed.x).pdf(&(changed.hit)(sample.hit)) / sample.pdf));
+                        ratios.push(f64::from(
+                            other.at(&changed.x).pdf(&(changed.hit)(sample.hit().expect("a triangle"))) / sample.pdf,
+                        ));
                     }
                 }
             }
@@ -263,9 +268,9 @@ fn the_winding_says_which_side_is_lit() {
         let [one, other, both] = [scene, other, both].map(|scene| scene.build(Arity::Sixteen));
         for _ in 0..20 {
             let Some(sample) = both.at(&x).sample(pcg.cube()) else { continue };
-            let [b1, b2] = sample.hit.barycentrics;
-            let here = one.at(&x).pdf(&sample.hit);
-            let there = other.at(&x).pdf(&Hit::new(sample.hit.triangle, [b2, b1]));
+            let [b1, b2] = sample.hit().expect("a triangle").barycentrics;
+            let here = one.at(&x).pdf(&sample.hit().expect("a triangle"));
+            let there = other.at(&x).pdf(&Hit::new(sample.hit().expect("a triangle").triangle, [b2, b1]));
             assert!((here > 0.0) != (there > 0.0), "{here} {there} at {sample:?} from {x:?}");
             if here > 0.0 { front += 1 } else { back += 1 }
         }

@@ -34,8 +34,11 @@ enum Estimator {
 
 /// Direction and contribution times the cosine of a sample's point, in double precision.
 fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> f64 {
-    let (m, t) = (sample.hit.triangle.mesh.index() as usize, sample.hit.triangle.triangle as usize);
-    let b = sample.hit.barycentrics.map(f64::from);
+    let (m, t) = (
+        sample.hit().expect("a triangle").triangle.mesh.index() as usize,
+        sample.hit().expect("a triangle").triangle.triangle as usize,
+    );
+    let b = sample.hit().expect("a triangle").barycentrics.map(f64::from);
     let [v0, v1, v2] = scene.meshes[m].vertices(t).map(|v| v.as_dvec3() - x.position.as_dvec3());
     let direction = (v0 * (1.0 - b[0] - b[1]) + v1 * b[0] + v2 * b[1]).normalize();
     oracle::sent(scene, m, t, b, direction) * oracle::cosine(&x.receiver, direction)

@@ -15,6 +15,7 @@ mod chi_square;
 mod docs;
 mod double_check;
 mod emission;
+mod environment_light;
 mod errors;
 mod fuzz_regressions;
 #[cfg(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))]

@@ -90,8 +90,9 @@ fn examine(lights: &LightSampler, scene: &Scene, x: &ShadingPoint, least_depth: 
     let (mut observed, mut kept, mut worst) = (vec![0.0; 2 * bins], Vec::new(), 0.0_f64);
     for _ in 0..SAMPLES {
         let Some(sample) = lights.at(x).sample(pcg.cube()) else { continue };
-        observed[sample.hit.triangle.triangle as usize * bins + bin(sample.hit.barycentrics, DEPTH)] += 1.0;
-        worst = worst.max(f64::from(lights.at(x).pdf(&sample.hit) / sample.pdf - 1.0).abs());
+        observed[sample.hit().expect("a triangle").triangle.triangle as usize * bins
+            + bin(sample.hit().expect("a triangle").barycentrics, DEPTH)] += 1.0;
+        worst = worst.max(f64::from(lights.at(x).pdf(&sample.hit().expect("a triangle")) / sample.pdf - 1.0).abs());
         kept.push(sample);
     }
     kept.truncate(2000);

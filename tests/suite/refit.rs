@@ -99,11 +99,11 @@ fn the_density_is_that_of_the_samples() {
             let x = random_point(&mut pcg, i);
             let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
             drawn += 1;
-            let again = lights.at(&x).pdf(&sample.hit);
+            let again = lights.at(&x).pdf(&sample.hit().expect("a triangle"));
             assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{}: {} {again}", other.name, sample.pdf);
-            let [a, b, c] =
-                other.meshes[sample.hit.triangle.mesh.index() as usize].vertices(sample.hit.triangle.triangle as usize);
-            let [b1, b2] = sample.hit.barycentrics;
+            let [a, b, c] = other.meshes[sample.hit().expect("a triangle").triangle.mesh.index() as usize]
+                .vertices(sample.hit().expect("a triangle").triangle.triangle as usize);
+            let [b1, b2] = sample.hit().expect("a triangle").barycentrics;
             let there = a * (1.0 - b1 - b2) + b * b1 + c * b2;
             assert!(there.distance(sample.position) < 1e-4, "the sample is not on the moved triangle");
         }
@@ -145,8 +145,11 @@ fn the_density_integrates_to_one() {
 
 /// What a sample's point sends to `x`, times the cosine.
 fn contribution(scene: &Scene, x: &ShadingPoint, sample: &LightSample) -> f64 {
-    let (m, t) = (sample.hit.triangle.mesh.index() as usize, sample.hit.triangle.triangle as usize);
-    let b = sample.hit.barycentrics.map(f64::from);
+    let (m, t) = (
+        sample.hit().expect("a triangle").triangle.mesh.index() as usize,
+        sample.hit().expect("a triangle").triangle.triangle as usize,
+    );
+    let b = sample.hit().expect("a triangle").barycentrics.map(f64::from);
     let [v0, v1, v2] = scene.meshes[m].vertices(t).map(|v| v.as_dvec3() - x.position.as_dvec3());
     let direction: DVec3 = (v0 * (1.0 - b[0] - b[1]) + v1 * b[0] + v2 * b[1]).normalize();
     oracle::sent(scene, m, t, b, direction) * oracle::cosine(&x.receiver, direction)
@@ -211,7 +214,7 @@ fn a_mesh_that_is_off_is_never_sampled() {
         let mut pcg = Pcg32::new(9, 33);
         for _ in 0..2000 {
             let sample = lights.at(&x).sample(pcg.cube());
-            assert!(sample.is_none_or(|sample| sample.hit.triangle.mesh.index() != 0));
+            assert!(sample.is_none_or(|sample| sample.hit().expect("a triangle").triangle.mesh.index() != 0));
             assert_eq!(sample.is_some(), count > 1);
         }
         assert_eq!(lights.at(&x).pmf(id_of(0, 0)), 0.0);
@@ -250,9 +253,11 @@ fn suns_are_seen_through_the_portals_that_are_on() {
         let mut count = 0;
         for _ in 0..4000 {
             let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
-            let again = lights.at(&x).pdf(&sample.hit);
+            let again = lights.at(&x).pdf(&sample.hit().expect("a triangle"));
             assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{} {again}", sample.pdf);
-            count += usize::from(sample.hit.triangle.mesh.index() == mesh && sample.direction.dot(sun) > 0.99);
+            count += usize::from(
+                sample.hit().expect("a triangle").triangle.mesh.index() == mesh && sample.direction.dot(sun) > 0.99,
+            );
         }
         count
     };
@@ -278,7 +283,9 @@ fn triangles_may_lose_their_area_and_get_it_back() {
     let sum: f32 = flat.triangles().map(|t| lights.at(&x).pmf(id(t))).sum();
     assert!((sum - 1.0).abs() < 1e-5, "{sum}");
     let mut pcg = Pcg32::new(11, 33);
-    (0..2000).for_each(|_| assert_ne!(lights.at(&x).sample(pcg.cube()).map(|s| s.hit.triangle), Some(id_of(1, 1))));
+    (0..2000).for_each(|_| {
+        assert_ne!(lights.at(&x).sample(pcg.cube()).map(|s| s.hit().expect("a triangle").triangle), Some(id_of(1, 1)));
+    });
     refit(&mut lights, &scene, &[]);
     assert_eq!(lights.at(&x).pmf(id_of(1, 1)), before);
 }

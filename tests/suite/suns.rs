@@ -2,7 +2,7 @@
 
 use crate::common::pcg::Pcg32;
 use crate::common::tier::some;
-use fanlight::{Environment, Filter, Hit, LightSample, LightSampler, Mesh, ShadingPoint, Splitting, Texture, Weight};
+use fanlight::{Environment, Filter, LightSample, LightSampler, Mesh, ShadingPoint, Splitting, Texture, Weight};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 
@@ -125,7 +125,7 @@ fn densities_agree_in_and_beside_the_sun() {
             for _ in 0..3000 {
                 let Some(sample) = lights.at(&x).sample(pcg.cube()) else { continue };
                 drawn += 1;
-                let again = lights.at(&x).pdf(&sample.hit);
+                let again = lights.at(&x).pdf(&sample.hit().expect("a triangle"));
                 assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{again} {}", sample.pdf);
                 let direction = lights.at(&x).pdf_sample_direction(&sample);
                 assert!(direction >= sample.pdf * 0.999_999);
@@ -219,7 +219,7 @@ fn split_samples_have_the_density_that_pdf_split_finds() {
             lights.at(&x).sample_split(pcg.cube(), &splitting, &mut samples);
             for sample in samples {
                 drawn += 1;
-                let hit: Hit = sample.hit;
+                let hit = sample.hit().expect("a triangle");
                 let again = lights.at(&x).pdf_split(&hit, &splitting);
                 assert!((again / sample.pdf - 1.0).abs() < 1e-5, "{again} {}", sample.pdf);
             }

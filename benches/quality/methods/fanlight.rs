@@ -51,8 +51,8 @@ impl Fanlight<'_> {
     #[inline]
     pub(crate) fn drawn(&self, sample: &LightSample, pdf: f32) -> Drawn {
         Drawn {
-            light: self.scene.light_index(sample.hit.triangle),
-            barycentrics: sample.hit.barycentrics,
+            light: self.scene.light_index(sample.hit().expect("a triangle").triangle),
+            barycentrics: sample.hit().expect("a triangle").barycentrics,
             direction: sample.direction,
             pdf: f64::from(pdf),
             radiance: None,

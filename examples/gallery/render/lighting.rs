@@ -98,7 +98,7 @@ impl Lights {
     /// A portal's number and a direction through it, as drawn for a point of a surface.
     pub(crate) fn sample_portal(&self, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<(usize, Vec3)> {
         let sample = self.sampler.at(&ShadingPoint::surface(position, normal)).sample(u)?;
-        let portal = sample.hit.triangle.mesh.index().checked_sub(self.emitters)?;
+        let portal = sample.hit()?.triangle.mesh.index().checked_sub(self.emitters)?;
         Some((portal as usize, sample.direction))
     }
 

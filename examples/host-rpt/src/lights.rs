@@ -38,14 +38,14 @@ impl Shape for Lights {
     /// A point, its normal, and its density per area. `rpt` knows a single radiance for a shape, so that the one of
     /// this point goes into the density. It does not say which way the surface faces that is lit.
     fn sample(&self, target: &DVec3, rng: &mut StdRng) -> (DVec3, DVec3, f64) {
-        let Some(sample) = self.sampler.at(&ShadingPoint::volume(to_f32(*target))).sample(rng.r#gen()) else {
+        let sample = self.sampler.at(&ShadingPoint::volume(to_f32(*target))).sample(rng.r#gen());
+        let Some((sample, hit)) = sample.and_then(|sample| Some((sample, sample.hit()?))) else {
             // A sample of zero, in a direction that is in the plane of no surface: `rpt` would divide by a cosine.
             let direction = glm::vec3(0.48, 0.64, 0.6);
             return (target + direction, direction, f64::INFINITY);
         };
-        let triangle = sample.hit.triangle;
-        let radiance =
-            self.emitters[triangle.mesh.index() as usize].radiance(triangle.triangle, sample.hit.barycentrics);
+        let triangle = hit.triangle;
+        let radiance = self.emitters[triangle.mesh.index() as usize].radiance(triangle.triangle, hit.barycentrics);
         (to_f64(sample.position), to_f64(sample.normal), f64::from(sample.pdf_area) / radiance)
     }
 }

@@ -15,6 +15,10 @@ pub(crate) fn lights(reader: &mut Reader<'_>) -> Option<LightSampler> {
     if let Some(environment) = environment(reader) {
         builder = builder.environment(environment);
     }
+    // By no byte of its own, so that inputs that were found keep their meaning.
+    if meshes.len() % 4 == 3 {
+        builder = builder.environment_as_light();
+    }
     let terms =
         [Illumination::default(), Illumination::Conservative, Illumination::PointToPoint, Illumination::Boundary];
     builder = builder.illumination(terms[reader.below(terms.len())]);

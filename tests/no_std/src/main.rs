@@ -52,9 +52,9 @@ pub extern "C" fn main() -> i32 {
     for i in 0..SAMPLES {
         let u = [uniform(3 * i), uniform(3 * i + 1), uniform(3 * i + 2)];
         let Some(sample) = sampler.at(&on_floor).sample(u) else { continue };
-        let pdf = sampler.at(&on_floor).pdf(&sample.hit);
+        let pdf = sampler.at(&on_floor).pdf(&sample.hit().expect("a triangle"));
         assert!((pdf - sample.pdf).abs() <= 1e-5 * sample.pdf, "sampled with {}, found {pdf}", sample.pdf);
-        if sample.hit.triangle.mesh.index() == 0 { portal += 1 } else { emitter += 1 }
+        if sample.hit().expect("a triangle").triangle.mesh.index() == 0 { portal += 1 } else { emitter += 1 }
     }
     assert!(portal > 0 && emitter > 0, "both lights are seen");
     let bytes = sampler.to_bytes();

@@ -194,7 +194,7 @@ pub(crate) fn bin(barycentrics: [f32; 2], depth: u32) -> usize {
 pub(crate) fn probes(scene: &Scene, samples: &[LightSample]) -> Vec<Vec<Vec<[f32; 2]>>> {
     let mut probes: Vec<_> = scene.meshes.iter().map(|mesh| vec![Vec::new(); mesh.indices.len()]).collect();
     for sample in samples {
-        let hit = sample.hit;
+        let hit = sample.hit().expect("a triangle");
         probes[hit.triangle.mesh.index() as usize][hit.triangle.triangle as usize].push(hit.barycentrics);
     }
     probes

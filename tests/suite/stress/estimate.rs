@@ -158,8 +158,11 @@ fn statistics(values: [f64; SETS]) -> [f64; 2] {
 
 /// What the point of a sample sends, times the cosine.
 fn contribution(row: &Row, x: &ShadingPoint, sample: &LightSample) -> f64 {
-    let (m, t) = (sample.hit.triangle.mesh.index() as usize, sample.hit.triangle.triangle as usize);
-    let b = sample.hit.barycentrics.map(f64::from);
+    let (m, t) = (
+        sample.hit().expect("a triangle").triangle.mesh.index() as usize,
+        sample.hit().expect("a triangle").triangle.triangle as usize,
+    );
+    let b = sample.hit().expect("a triangle").barycentrics.map(f64::from);
     let [v0, v1, v2] = oracle::relative(&row.scene.meshes[m], t, x);
     let direction = (v0 * (1.0 - b[0] - b[1]) + v1 * b[0] + v2 * b[1]).normalize();
     let sent = if row.ones { 1.0 } else { oracle::sent(&row.scene, m, t, b, direction) };

@@ -62,7 +62,7 @@ pub(crate) fn all(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSamp
 /// The sum of all triangles' probabilities, times what the integral over some that were drawn is of theirs.
 pub(crate) fn some(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSample], cells: usize) -> (f64, f64) {
     let total: f64 = row.scene.triangles().map(|t| f64::from(at.pmf(id(t)))).sum();
-    let some: Vec<_> = kept.iter().take(SOME).map(|sample| sample.hit.triangle).collect();
+    let some: Vec<_> = kept.iter().take(SOME).map(|sample| sample.hit().expect("a triangle").triangle).collect();
     let (mut ratio, mut variance) = (0.0, 0.0);
     for triangle in &some {
         let triangle = (triangle.mesh.index() as usize, triangle.triangle as usize);

@@ -224,7 +224,7 @@ impl Wrong<'_> {
 impl Point for Wrong<'_> {
     fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
         let mut sample = self.0.sample(u)?;
-        sample.pdf *= Self::factor(sample.hit.barycentrics);
+        sample.pdf *= Self::factor(sample.hit().expect("a triangle").barycentrics);
         Some(sample)
     }
 

@@ -109,7 +109,7 @@ fn is_many(row: &Row) -> bool {
 }
 
 fn check_numbers(row: &Row, x: &ShadingPoint, sample: &LightSample) {
-    let [b1, b2] = sample.hit.barycentrics;
+    let [b1, b2] = sample.hit().expect("a triangle").barycentrics;
     let vectors = sample.position.is_finite() && sample.direction.is_normalized() && sample.normal.is_normalized();
     let positive = [sample.pdf, sample.pdf_area, sample.pmf, sample.distance].iter().all(|v| *v > 0.0 && v.is_finite());
     let inside = b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0;
@@ -140,7 +140,8 @@ fn agreement(
         found.samples += 1;
         let Some(sample) = at.sample(u) else { continue };
         check_numbers(row, x, &sample);
-        found.agreement = found.agreement.max(difference(at.pdf(&sample.hit), f64::from(sample.pdf)));
+        found.agreement =
+            found.agreement.max(difference(at.pdf(&sample.hit().expect("a triangle")), f64::from(sample.pdf)));
         if i < directions {
             let along = at.pdf_sample_direction(&sample);
             assert!(along >= sample.pdf && along.is_finite(), "{}: {along} along {sample:?}", row.name);

@@ -33,7 +33,7 @@ fn any_numbers_give_samples_with_their_density() {
             let u = [i, i / all.len(), i / all.len() / all.len()].map(|i| all[i % all.len()]);
             let Some(sample) = at.sample(u) else { continue };
             found += 1;
-            let difference = (at.pdf(&sample.hit) / sample.pdf - 1.0).abs();
+            let difference = (at.pdf(&sample.hit().expect("a triangle")) / sample.pdf - 1.0).abs();
             assert!(difference <= 1e-5 && sample.direction.is_normalized(), "{u:?} at {x:?}: {sample:?}");
         }
     }
@@ -47,7 +47,7 @@ fn histogram(scene: &Scene, lights: &LightSampler, x: &ShadingPoint, samples: us
     let mut observed = vec![0.0; scene.triangles().count()];
     for _ in 0..samples {
         let sample = at.sample(pcg.cube()).expect("every light is visible");
-        observed[sample.hit.triangle.triangle as usize] += 1.0;
+        observed[sample.hit().expect("a triangle").triangle.triangle as usize] += 1.0;
     }
     let expected = scene.triangles().map(|t| samples as f64 * f64::from(at.pmf(id(t)))).collect();
     [observed, expected]

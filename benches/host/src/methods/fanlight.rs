@@ -1,11 +1,11 @@
 //! Every call of `fanlight` is in this file: emitters and sky as the crate's documentation recommends.
 //!
-//! One sampler holds the emitters and the portals. A sample on an emitter stands for that point alone; a sample on a portal
-//! stands for the sky along the direction, through whatever portals the ray crosses. A sky that no portal leads to is sampled
-//! as a second technique.
+//! One sampler holds the emitters and the portals, and the sky where no portal leads to it. A sample on an emitter stands for
+//! that point alone; a sample on a portal stands for the sky along the direction, through whatever portals the ray crosses.
 
 use fanlight::{
-    Environment, Filter, Hit, LightSampler, Mesh, MeshId, PointSampler, ShadingPoint, Texture, TriangleId, Weight, Wrap,
+    Environment, Filter, Hit, LightSampler, Mesh, MeshId, PointSampler, SampledLight, ShadingPoint, Texture,
+    TriangleId, Weight, Wrap,
 };
 use glam::Vec3;
 
@@ -23,9 +23,7 @@ pub(super) struct Fanlight {
     ids: Vec<TriangleId>,
     /// The number of the first triangle of each emitter among all of them.
     starts: Vec<u32>,
-    /// Whether there are emitters or portals.
-    has_lights: bool,
-    /// Whether the sky is seen, but not through portals.
+    /// Whether the sky is a light itself, as no portal leads to it.
     open_sky: bool,
 }
 
@@ -38,6 +36,10 @@ impl Fanlight {
             let environment =
                 Environment::from_lat_long(sky.image().width, sky.image().height, &sky.luminance(), Filter::Bilinear)?;
             builder = builder.environment(environment.with_rotation(sky.rotation())?);
+        }
+        let open_sky = scene.sky.is_some() && scene.portals.is_empty();
+        if open_sky {
+            builder = builder.environment_as_light();
         }
         for emitter in &scene.emitters {
             let mesh = Mesh::emitter(&emitter.mesh.positions, &emitter.mesh.indices);
@@ -59,13 +61,7 @@ impl Fanlight {
             *next += emitter.mesh.indices.len() as u32;
             Some(first)
         });
-        Ok(Self {
-            lights: builder.build()?,
-            ids: ids.collect(),
-            starts: starts.collect(),
-            has_lights: !scene.emitters.is_empty() || !scene.portals.is_empty(),
-            open_sky: scene.sky.is_some() && scene.portals.is_empty(),
-        })
+        Ok(Self { lights: builder.build()?, ids: ids.collect(), starts: starts.collect(), open_sky })
     }
 }
 
@@ -88,31 +84,28 @@ impl Lighting for Fanlight {
 impl LightsHere for Here<'_> {
     #[inline]
     fn propose(&self, random: &mut Pcg32, mut visit: impl FnMut(Proposal)) {
-        if self.fanlight.open_sky
-            && let Some(sample) = self.fanlight.lights.environment().sample(random.uniform2())
-        {
-            visit(Proposal { direction: sample.direction, target: Target::Sky, pdf: sample.pdf });
-        }
-        if self.fanlight.has_lights
-            && let Some(sample) = self.lights.sample(random.uniform3())
-        {
-            let TriangleId { mesh, triangle, .. } = sample.hit.triangle;
-            let (target, pdf) = match self.fanlight.starts.get(mesh.index() as usize) {
-                Some(first) => {
-                    let barycentrics = sample.hit.barycentrics;
-                    let point = EmitterPoint { triangle: first + triangle, barycentrics, position: sample.position };
-                    (Target::Emitter(point), sample.pdf)
+        let Some(sample) = self.lights.sample(random.uniform3()) else { return };
+        let (target, pdf) = match sample.light {
+            SampledLight::Triangle(Hit { triangle: TriangleId { mesh, triangle, .. }, barycentrics, .. }) => {
+                match self.fanlight.starts.get(mesh.index() as usize) {
+                    Some(first) => {
+                        let point =
+                            EmitterPoint { triangle: first + triangle, barycentrics, position: sample.position };
+                        (Target::Emitter(point), sample.pdf)
+                    }
+                    None => (Target::Sky, self.lights.pdf_sample_direction(&sample)),
                 }
-                None => (Target::Sky, self.lights.pdf_sample_direction(&sample)),
-            };
-            visit(Proposal { direction: sample.direction, target, pdf });
-        }
+            }
+            SampledLight::Environment => (Target::Sky, sample.pdf),
+            _ => return,
+        };
+        visit(Proposal { direction: sample.direction, target, pdf });
     }
 
     #[inline]
     fn sky_pdf(&self, direction: Vec3) -> f32 {
         if self.fanlight.open_sky {
-            self.fanlight.lights.environment().pdf(direction)
+            self.lights.pdf_environment(direction)
         } else {
             self.lights.pdf_direction(direction)
         }
