@@ -25,6 +25,13 @@ pub(crate) use list::VisibleFeatures;
 use list::{ANY_PORTAL, MAX_VISIBLE, VisibleFeature};
 use view::FeatureView;
 
+/// Least number of parts that are measured of a feature that has more of them than there is room for. *Chosen*: their mean
+/// stands for all others.
+///
+/// Larger: more parts are measured where the list is full. Smaller: one small part could stand for many large ones, so that
+/// the feature starves.
+const LEAST_MEASURED: usize = 16;
+
 impl VisibleFeatures {
     /// Lists all features that are visible from a shading point.
     pub(super) fn find(&mut self, at: &Viewpoint<'_>) {
@@ -44,26 +51,27 @@ impl VisibleFeatures {
         let FeatureNode { sin_radius, power, .. } = environment.feature_nodes()[node as usize];
         let axis = environment.feature_axis(node as usize);
         let start = self.len();
-        let mut more = 0.0;
+        // Weights of all parts that were measured, how many they are, and how many lights were only counted.
+        let (mut sum, mut measured, mut more) = (0.0, 0, 0);
         let cone = [sin_radius, math::sqrt((1.0 - sin_radius * sin_radius).max(0.0))];
         let visit = |leaf: u32| {
             let scale = at.scene.lights.scale(leaf);
             if !at.scene.lights.light(leaf).is_portal() || scale == 0.0 {
                 return;
             }
-            if more > 0.0 {
-                more += 1.0;
+            if measured > end - start && measured >= LEAST_MEASURED {
+                more += 1;
                 return;
             }
             let view = &at.view(leaf);
             let Some(triangle) = view.as_ref().and_then(LightView::as_portal) else { return };
             self.note(triangle.is_close());
             FeatureView::new(triangle, environment, node as usize).visit(|part, through| {
+                let weight = through * scale * cosine;
                 if self.len() < end {
-                    self.push(leaf, node, part, through * scale * cosine);
-                } else {
-                    more += 1.0;
+                    self.push(leaf, node, part, weight);
                 }
+                (sum, measured) = (sum + weight, measured + 1);
             });
         };
         if sin_radius < 1.0 {
@@ -71,8 +79,8 @@ impl VisibleFeatures {
         } else {
             (0..at.scene.lights.len() as u32).for_each(visit);
         }
-        if more > 0.0 {
-            let all = self.irradiance_from(start) * (1.0 + more / (end - start) as f32);
+        if measured > end - start {
+            let all = sum * (1.0 + more as f32 / measured as f32);
             self.merge(start, node, all.min(power * cosine));
         }
     }
@@ -125,7 +133,8 @@ impl Technique for VisibleFeatures {
                 continue;
             }
             let per_excess = if visible.leaf == ANY_PORTAL {
-                let is_least = least_crossed(at, direction).is_some_and(|least| least.leaf == leaf);
+                // On an edge, rounding may take the ray past the very light that the point lies on.
+                let is_least = least_crossed(at, direction).is_none_or(|least| least.leaf >= leaf);
                 if is_least { 1.0 / f64::from(environment.feature_nodes()[node].power) } else { 0.0 }
             } else if visible.part.cell.holds(point) {
                 FeatureView::new(triangle, environment, node).pdf_per_excess(visible.part, point)
