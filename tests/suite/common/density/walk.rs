@@ -141,8 +141,8 @@ impl<'a, 'b> Walk<'a, 'b> {
             let of_quarter = |q| (0..4).map(move |i| middle(quarter(q, i)));
             parts.extend(quarters.into_iter().flat_map(of_quarter).map(|b| self.on.density(b)));
         }
-        // A horizon may leave no more than a tip of a cell.
-        if self.on.is_limited() && are_equal {
+        // A horizon, or the rim of what is black, may leave no more than a tip of a cell.
+        if are_equal && (self.on.is_limited() || densest == 0.0) {
             parts.extend((0..3).map(|k| self.on.density(tip(cell.corners, k))));
         }
         let all = || values.iter().chain(&parts).copied().chain(cell.probes.iter().map(|p| p.1));
