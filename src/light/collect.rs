@@ -199,6 +199,7 @@ impl<'a> LightCollection<'a> {
             illumination,
             energy: 0.0,
             has_portals,
+            is_crossed_once: false,
             triangles: parallel::collect(leaves.len(), |leaf| self.triangles[leaves[leaf] as usize]),
             cells: self.cells,
             leaf_of: self.indices.iter().map(leaf_of).collect(),

@@ -6,6 +6,7 @@
 
 mod cell_weight;
 mod collect;
+mod crossing;
 mod emitted;
 mod energy;
 mod illumination;
@@ -53,6 +54,8 @@ buffers! {
         energy: f32,
         /// Whether any light is a portal.
         has_portals: bool,
+        /// Whether a ray is known to meet at most one light that shines back along it.
+        is_crossed_once: bool,
     }
     buffers {
         /// Triangles, in the order of the tree's leaves.

@@ -28,14 +28,14 @@ struct Parameters {
     illumination: u32,
     energy: f32,
     has_portals: u32,
-    padding: u32,
+    is_crossed_once: u32,
 }
 
 const _: () = assert!(size_of::<Parameters>() == 24);
 
 impl Parameters {
     const TAG: [u8; 4] = *b"PARA";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
 }
 
 impl<'a> LightSamplerView<'a> {
@@ -50,7 +50,7 @@ impl<'a> LightSamplerView<'a> {
             illumination: lights.illumination as u32,
             energy: lights.energy,
             has_portals: lights.has_portals.into(),
-            padding: 0,
+            is_crossed_once: lights.is_crossed_once.into(),
         }];
         let mut sections = Vec::new();
         sections.push(Section::new(Parameters::TAG, Parameters::VERSION, &parameters));
@@ -70,9 +70,10 @@ impl<'a> LightSamplerView<'a> {
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut sections = Sections::new(bytes)?;
         let parameters: Parameters = sections.take_value(Parameters::TAG, Parameters::VERSION, "parameters")?;
-        let Parameters { light_arity, texture_arity, illumination, energy, has_portals, .. } = parameters;
+        let Parameters { light_arity, texture_arity, illumination, energy, has_portals, is_crossed_once } = parameters;
         Error::unless_equal("arity of the trees over textures", texture_arity as usize, blas::ARITY)?;
         Error::unless_equal("mark of portals", (has_portals & !1) as usize, 0)?;
+        Error::unless_equal("mark of single crossings", (is_crossed_once & !1) as usize, 0)?;
         let arity = Arity::from_code(light_arity)
             .ok_or_else(|| Error::bytes("arity of the tree over the lights", 0, light_arity, 16u64))?;
         let illumination =
@@ -81,7 +82,8 @@ impl<'a> LightSamplerView<'a> {
             return Err(Error::bytes("energy", 0, energy.to_bits(), 0u64));
         }
         let tlas = TlasView::from_sections(&mut sections, arity)?;
-        let lights = LightsView::from_sections(&mut sections, illumination, energy, has_portals != 0)?;
+        let lights =
+            LightsView::from_sections(&mut sections, illumination, energy, has_portals != 0, is_crossed_once != 0)?;
         let environment = EnvironmentView::from_all_sections(&mut sections)?;
         sections.end()?;
         tlas.validate()?;

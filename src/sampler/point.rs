@@ -85,9 +85,14 @@ impl<'a> PointSampler<'a> {
     /// Returns [`Self::pdf_direction`] of a sample's own direction.
     ///
     /// The sampled point counts with its own density whatever rounding does to the ray, so the result is never below
-    /// `sample.pdf`. Only what else the ray crosses is followed down the trees, so this is faster as well.
+    /// `sample.pdf`. Only what else the ray crosses is followed down the trees, so this is faster as well. Where all lights
+    /// lie side by side in one plane, or on the surface of one convex body and face into it, nothing else can be crossed, and
+    /// the result is `sample.pdf`.
     #[must_use]
     pub fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
+        if self.at.scene.lights.is_crossed_once {
+            return sample.pdf;
+        }
         let own = self.at.scene.lights.leaf(sample.hit.triangle);
         let others = self.direction_density(sample.direction, own, &self.mixture.one());
         to_finite(f64::from(sample.pdf) + others)

@@ -44,5 +44,6 @@ impl LightSampler {
         let total = energies.total(lights.len(), |leaf| lights.light(leaf as u32));
         self.cost = self.tlas.fit(&|leaf| energies.bounds(lights.light(leaf), total));
         self.lights.energy = storable(total);
+        self.lights.find_crossings();
     }
 }

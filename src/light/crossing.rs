@@ -1,0 +1,193 @@
+//! Whether any ray meets at most one light that shines back along it. Then the density of a sample is that of its direction,
+//! and nothing else along the ray need be looked for.
+//!
+//! Two arrangements are recognized: lights side by side in one plane, and lights on the surface of one convex body that all
+//! face into it, such as the windows of a room. A ray leaves a convex body once.
+
+use alloc::vec::Vec;
+
+use glam::DVec3;
+
+use super::{LightKind, LightTriangle, Lights};
+use crate::math::sqrt64;
+
+/// Most planes that lights may lie in. *Chosen*: a room has six.
+///
+/// Larger: a build compares each light with more planes before it gives up. Smaller: bodies of many faces are not recognized.
+const MAX_PLANES: usize = 64;
+
+/// Largest distance of a vertex from a plane that it counts as lying in, relative to the coordinates of both. *Proved*: twice
+/// what rounding to `f32` moves a vertex and the plane by, rounded up. A ray that meets two lights then runs along both within
+/// this angle.
+///
+/// Larger: lights that a ray meets both of would count as one plane. Smaller: a wall whose vertices are rounded would not.
+const PLANE_ROUNDING: f64 = 5e-7;
+
+/// Largest overlap of two lights in one plane that counts as none, relative to the smaller one. *Chosen*: its share of the
+/// light is below the rounding of a density.
+///
+/// Larger: overlaps would be ignored. Smaller: neighbors with rounded vertices would count as overlapping.
+const OVERLAP_ROUNDING: f64 = 1e-6;
+
+/// Most pairs of lights that are compared, for each light. *Chosen*: a grid of a hundred lights across compares as many.
+///
+/// Larger: builds of large walls take longer. Smaller: large walls are not recognized.
+const MAX_PAIRS: usize = 256;
+
+/// A triangle in double precision.
+struct Face {
+    vertices: [DVec3; 3],
+    /// Unit normal of the front side.
+    normal: DVec3,
+    /// Largest coordinate.
+    extent: f64,
+    is_two_sided: bool,
+}
+
+impl Face {
+    fn new(light: &LightTriangle) -> Option<Self> {
+        let triangle = light.triangle();
+        let normal = triangle.double_area_vector().try_normalize()?;
+        let extent = triangle.0.iter().fold(0.0, |extent: f32, vertex| extent.max(vertex.abs().max_element()));
+        let vertices = triangle.0.map(|vertex| vertex.as_dvec3());
+        Some(Self { vertices, normal, extent: extent.into(), is_two_sided: light.is_two_sided() })
+    }
+}
+
+/// A plane that lights lie in.
+struct Plane {
+    /// The first light that was found in it.
+    face: Face,
+    /// Whether there are lights to both of its sides.
+    is_two_sided: bool,
+}
+
+impl Plane {
+    /// Returns the least and the largest height of a face over the plane, with what rounding does to them.
+    fn heights(&self, face: &Face) -> [f64; 3] {
+        let heights = face.vertices.map(|vertex| self.face.normal.dot(vertex - self.face.vertices[0]));
+        let [low, high] = [f64::min, f64::max].map(|of| of(of(heights[0], heights[1]), heights[2]));
+        [low, high, PLANE_ROUNDING * (self.face.extent + face.extent)]
+    }
+
+    fn holds(&self, face: &Face) -> bool {
+        let [low, high, rounding] = self.heights(face);
+        low >= -rounding && high <= rounding
+    }
+}
+
+impl Lights {
+    /// Finds out whether a ray meets at most one light that shines back along it.
+    pub(crate) fn find_crossings(&mut self) {
+        self.is_crossed_once = is_crossed_once(&self.triangles);
+    }
+}
+
+/// Whether a ray meets at most one light that shines back along it, as far as the recognized arrangements go.
+fn is_crossed_once(lights: &[LightTriangle]) -> bool {
+    let mut planes: Vec<Plane> = Vec::new();
+    let mut members = Vec::with_capacity(lights.len());
+    for light in lights {
+        let Some(face) = Face::new(light) else { return false };
+        let number = match planes.iter().position(|plane| plane.holds(&face)) {
+            Some(number) => number,
+            None if planes.len() == MAX_PLANES => return false,
+            None => {
+                members.push((planes.len(), light));
+                planes.push(Plane { is_two_sided: face.is_two_sided, face });
+                continue;
+            }
+        };
+        let plane = &mut planes[number];
+        plane.is_two_sided |= face.is_two_sided || plane.face.normal.dot(face.normal) < 0.0;
+        members.push((number, light));
+    }
+    is_convex(&planes, lights) && are_apart(&planes, members)
+}
+
+/// Whether all lights are on the front side of all planes.
+fn is_convex(planes: &[Plane], lights: &[LightTriangle]) -> bool {
+    planes.len() <= 1
+        || planes.iter().all(|plane| {
+            let is_in_front = |light| {
+                Face::new(light).is_some_and(|face| {
+                    let [low, _, rounding] = plane.heights(&face);
+                    low >= -rounding
+                })
+            };
+            !plane.is_two_sided && lights.iter().all(is_in_front)
+        })
+}
+
+/// A light in the coordinates of its plane.
+struct FlatFace {
+    plane: usize,
+    vertices: [[f64; 2]; 3],
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl FlatFace {
+    /// Leaves out the axis along which the plane's normal is largest.
+    fn new(plane: usize, normal: DVec3, light: &LightTriangle) -> Self {
+        let size = normal.abs();
+        let axes = if size.x >= size.y.max(size.z) {
+            [1, 2]
+        } else if size.y >= size.z {
+            [0, 2]
+        } else {
+            [0, 1]
+        };
+        let vertices = light.vertices.map(|vertex| axes.map(|axis| f64::from(vertex[axis])));
+        let end = |of: fn(f64, f64) -> f64| [0, 1].map(|k| of(of(vertices[0][k], vertices[1][k]), vertices[2][k]));
+        Self { plane, vertices, low: end(f64::min), high: end(f64::max) }
+    }
+
+    fn size(&self) -> f64 {
+        (self.high[0] - self.low[0]).max(self.high[1] - self.low[1])
+    }
+
+    /// Whether no more of two lights overlaps than rounding may have caused: one of their edges separates them.
+    fn is_apart(&self, other: &Self) -> bool {
+        let most = OVERLAP_ROUNDING * self.size().min(other.size());
+        self.has_beyond_an_edge(other, most) || other.has_beyond_an_edge(self, most)
+    }
+
+    /// Whether another light is on the outer side of one of the edges, up to `most` within.
+    fn has_beyond_an_edge(&self, other: &Self, most: f64) -> bool {
+        (0..3).any(|i| {
+            let [a, b, c] = [0, 1, 2].map(|k| self.vertices[(i + k) % 3]);
+            let edge = [b[0] - a[0], b[1] - a[1]];
+            let inside = |p: [f64; 2]| edge[0] * (p[1] - a[1]) - edge[1] * (p[0] - a[0]);
+            let (sign, length) = (inside(c).signum(), sqrt64(edge[0] * edge[0] + edge[1] * edge[1]));
+            other.vertices.iter().all(|&p| sign * inside(p) <= most * length)
+        })
+    }
+}
+
+/// Whether no two lights of one plane overlap. Sweeps across each plane along its first axis.
+fn are_apart(planes: &[Plane], members: Vec<(usize, &LightTriangle)>) -> bool {
+    let flat = |(plane, light): (usize, &LightTriangle)| FlatFace::new(plane, planes[plane].face.normal, light);
+    let mut faces: Vec<FlatFace> = members.into_iter().map(flat).collect();
+    faces.sort_unstable_by(|a, b| {
+        (a.plane, a.low[0]).partial_cmp(&(b.plane, b.low[0])).unwrap_or(core::cmp::Ordering::Equal)
+    });
+    let mut left = MAX_PAIRS * faces.len();
+    for (i, face) in faces.iter().enumerate() {
+        let is_near = |other: &&FlatFace| other.plane == face.plane && other.low[0] < face.high[0];
+        for other in faces[i + 1..].iter().take_while(is_near) {
+            if left == 0 {
+                return false;
+            }
+            left -= 1;
+            let share = [0, 1].iter().all(|&k| other.low[k] < face.high[k] && face.low[k] < other.high[k]);
+            if share && !face.is_apart(other) {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests;
