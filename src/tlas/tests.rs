@@ -17,10 +17,10 @@ use crate::simd::InstructionSet;
 use crate::testing::Pcg32;
 use crate::warp::{Variate, seed};
 
-type Light = (LightBounds, Moments);
+type BoundedLight = (LightBounds, Moments);
 
 /// The tree over lights, and the lights in the order of its leaves.
-pub(super) fn build(arity: Arity, lights: &[Light]) -> (Tlas, Vec<u32>) {
+pub(super) fn build(arity: Arity, lights: &[BoundedLight]) -> (Tlas, Vec<u32>) {
     let (mut tlas, order) =
         super::build(arity, lights.len(), &|light| lights[light as usize].0, &Progress::new(None, 1.0))
             .expect("nobody cancels");
@@ -69,7 +69,7 @@ fn odd(x: &ShadingPoint) -> Before<'_> {
     Before { x, odd_alone: true }
 }
 
-fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<Light> {
+fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<BoundedLight> {
     let size = 0.3 / (n as f32).cbrt();
     let light = |_| {
         let center = Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());

@@ -136,7 +136,7 @@ pub(crate) fn build_procedural(
     pool: &mut Vec<CellNode>,
 ) -> Result<Root, Error> {
     let source = FunctionOnTriangle::new(function.function, uv);
-    let fail = |fault: Fault| Error(fault.kind(mesh));
+    let fail = |fault: FunctionFault| Error(fault.kind(mesh));
     let range = source.range(LatticeCell::whole()).map_err(fail)?;
     if range.is_constant() {
         return Ok(Root::constant(storable(f64::from(range.max))));
@@ -184,24 +184,24 @@ impl<'a> FunctionOnTriangle<'a> {
     }
 
     /// The weight at a place of a cell, if it lies within the cell's range.
-    fn weight(&self, uv: Vec2, cell: LatticeCell, TexelRange { min, max }: TexelRange) -> Result<f32, Fault> {
+    fn weight(&self, uv: Vec2, cell: LatticeCell, TexelRange { min, max }: TexelRange) -> Result<f32, FunctionFault> {
         let weight = self.function.weight(uv);
         if weight >= min - BOUND_TOLERANCE * max && weight <= max + BOUND_TOLERANCE * max {
             Ok(weight)
         } else {
-            Err(Fault { region: self.region(cell), bounds: [min, max], weight: Some((uv, weight)) })
+            Err(FunctionFault { region: self.region(cell), bounds: [min, max], weight: Some((uv, weight)) })
         }
     }
 }
 
 impl FunctionOnTriangle<'_> {
     /// What the function says that it lies between over a cell.
-    fn range(&self, cell: LatticeCell) -> Result<TexelRange, Fault> {
+    fn range(&self, cell: LatticeCell) -> Result<TexelRange, FunctionFault> {
         let region = self.region(cell);
         let [min, max] = self.function.bounds(region[0], region[1]);
         // NaN fails every comparison.
         if !(min >= 0.0 && min <= max && max < f32::INFINITY) {
-            return Err(Fault { region, bounds: [min, max], weight: None });
+            return Err(FunctionFault { region, bounds: [min, max], weight: None });
         }
         let range = TexelRange { min, max };
         if range.is_constant() {
@@ -213,7 +213,7 @@ impl FunctionOnTriangle<'_> {
     }
 
     /// The mean of the weights at the middles of the cell's parts.
-    fn average(&self, cell: LatticeCell, range: TexelRange) -> Result<f32, Fault> {
+    fn average(&self, cell: LatticeCell, range: TexelRange) -> Result<f32, FunctionFault> {
         if range.is_constant() {
             return Ok(storable(f64::from(range.max)));
         }
@@ -229,14 +229,14 @@ impl FunctionOnTriangle<'_> {
 }
 
 impl WeightSource for FunctionOnTriangle<'_> {
-    type Fault = Fault;
+    type Fault = FunctionFault;
 
-    fn constant(&self, cell: LatticeCell) -> Result<Option<f32>, Fault> {
+    fn constant(&self, cell: LatticeCell) -> Result<Option<f32>, FunctionFault> {
         let range = self.range(cell)?;
         Ok(range.is_constant().then_some(range.max))
     }
 
-    fn measure(&self, cell: LatticeCell) -> Result<(TexelRange, f32), Fault> {
+    fn measure(&self, cell: LatticeCell) -> Result<(TexelRange, f32), FunctionFault> {
         let range = self.range(cell)?;
         Ok((range, self.average(cell, range)?))
     }
@@ -248,13 +248,13 @@ impl WeightSource for FunctionOnTriangle<'_> {
 }
 
 /// A bound that is not one, or a weight outside of its bound.
-struct Fault {
+struct FunctionFault {
     region: [Vec2; 2],
     bounds: [f32; 2],
     weight: Option<(Vec2, f32)>,
 }
 
-impl Fault {
+impl FunctionFault {
     fn kind(self, mesh: usize) -> ErrorKind {
         let Self { region, bounds, weight } = self;
         let region = region.map(|corner| corner.to_array());
