@@ -116,8 +116,9 @@ impl Technique for VisibleFeatures {
             for (visible, weight) in self.of_feature(feature) {
                 let LightPoint { leaf, point } = point;
                 let per_excess = if visible.leaf == ANY_PORTAL {
-                    // On an edge, rounding may take the ray past the very light that the point lies on.
-                    let is_least = least_crossed(at, direction).is_none_or(|least| least.leaf >= leaf);
+                    // On an edge, rounding may take the ray past the very light that the point lies on, or to its neighbor.
+                    let is_least = at.scene.lights.is_crossed_once
+                        || least_crossed(at, direction).is_none_or(|least| least.leaf >= leaf);
                     if is_least { 1.0 / f64::from(environment.bright_features()[feature].power) } else { 0.0 }
                 } else if visible.leaf == leaf && visible.part.cell.holds(point) {
                     FeatureView::new(triangle, environment, feature).pdf_per_excess(visible.part, point)
