@@ -16,12 +16,12 @@ use crate::math::sqrt64;
 /// Larger: a build compares each light with more planes before it gives up. Smaller: bodies of many faces are not recognized.
 const MAX_PLANES: usize = 64;
 
-/// Largest distance of a vertex from a plane that it counts as lying in, relative to the coordinates of both. *Proved*: twice
-/// what rounding to `f32` moves a vertex and the plane by, rounded up. A ray that meets two lights then runs along both within
-/// this angle.
+/// Largest distance of a vertex from a plane that it counts as lying in, relative to the coordinates of both. *Chosen*: rounding
+/// to `f32` moves a vertex by at most 1.04e-7 of them (√3 · 2⁻²⁴). A ray that meets two lights of what counts as one plane runs
+/// along both, at an angle of at most this distance over their size.
 ///
-/// Larger: lights that a ray meets both of would count as one plane. Smaller: a wall whose vertices are rounded would not.
-const PLANE_ROUNDING: f64 = 5e-7;
+/// Larger: lights would count as one plane that are not. Smaller: a turned wall would not, as its vertices are rounded.
+const PLANE_ROUNDING: f64 = 2.5e-7;
 
 /// Largest overlap of two lights in one plane that counts as none, relative to the smaller one. *Chosen*: its share of the
 /// light is below the rounding of a density.
@@ -29,51 +29,55 @@ const PLANE_ROUNDING: f64 = 5e-7;
 /// Larger: overlaps would be ignored. Smaller: neighbors with rounded vertices would count as overlapping.
 const OVERLAP_ROUNDING: f64 = 1e-6;
 
-/// Most pairs of lights that are compared, for each light. *Chosen*: a grid of a hundred lights across compares as many.
+/// Most pairs of lights that are compared, for each light. *Chosen*: in a wall of n by n windows, a light is compared with about
+/// n others of its column.
 ///
-/// Larger: builds of large walls take longer. Smaller: large walls are not recognized.
+/// Larger: builds of large walls take longer; with 256, up to half a second for a million lights. Smaller: large walls are not
+/// recognized.
 const MAX_PAIRS: usize = 256;
-
-/// A triangle in double precision.
-struct Face {
-    vertices: [DVec3; 3],
-    /// Unit normal of the front side.
-    normal: DVec3,
-    /// Largest coordinate.
-    extent: f64,
-    is_two_sided: bool,
-}
-
-impl Face {
-    fn new(light: &LightTriangle) -> Option<Self> {
-        let triangle = light.triangle();
-        let normal = triangle.double_area_vector().try_normalize()?;
-        let extent = triangle.0.iter().fold(0.0, |extent: f32, vertex| extent.max(vertex.abs().max_element()));
-        let vertices = triangle.0.map(|vertex| vertex.as_dvec3());
-        Some(Self { vertices, normal, extent: extent.into(), is_two_sided: light.is_two_sided() })
-    }
-}
 
 /// A plane that lights lie in.
 struct Plane {
-    /// The first light that was found in it.
-    face: Face,
+    /// A point of the first light that was found in it.
+    origin: DVec3,
+    /// Unit normal of that light's front side.
+    normal: DVec3,
+    /// Largest coordinate of that light.
+    extent: f64,
     /// Whether there are lights to both of its sides.
     is_two_sided: bool,
 }
 
 impl Plane {
-    /// Returns the least and the largest height of a face over the plane, with what rounding does to them.
-    fn heights(&self, face: &Face) -> [f64; 3] {
-        let heights = face.vertices.map(|vertex| self.face.normal.dot(vertex - self.face.vertices[0]));
-        let [low, high] = [f64::min, f64::max].map(|of| of(of(heights[0], heights[1]), heights[2]));
-        [low, high, PLANE_ROUNDING * (self.face.extent + face.extent)]
+    /// Returns the plane of a light, or `None` where the light has no area.
+    fn new(light: &LightTriangle) -> Option<Self> {
+        let triangle = light.triangle();
+        let normal = triangle.double_area_vector().try_normalize()?;
+        let origin = triangle.0[0].as_dvec3();
+        Some(Self { origin, normal, extent: extent(light), is_two_sided: light.is_two_sided() })
     }
 
-    fn holds(&self, face: &Face) -> bool {
-        let [low, high, rounding] = self.heights(face);
+    /// Returns the least and the largest height of a light over the plane, and what rounding may do to them.
+    fn heights(&self, light: &LightTriangle) -> [f64; 3] {
+        let [a, b, c] = light.triangle().0.map(|vertex| self.normal.dot(vertex.as_dvec3() - self.origin));
+        [a.min(b).min(c), a.max(b).max(c), PLANE_ROUNDING * (self.extent + extent(light))]
+    }
+
+    fn holds(&self, light: &LightTriangle) -> bool {
+        let [low, high, rounding] = self.heights(light);
         low >= -rounding && high <= rounding
     }
+
+    /// Whether a light is nowhere behind the plane.
+    fn is_in_front(&self, light: &LightTriangle) -> bool {
+        let [low, _, rounding] = self.heights(light);
+        low >= -rounding
+    }
+}
+
+/// Returns the largest coordinate of a light.
+fn extent(light: &LightTriangle) -> f64 {
+    light.vertices.as_flattened().iter().fold(0.0, |extent: f32, x| extent.max(x.abs())).into()
 }
 
 impl Lights {
@@ -86,37 +90,24 @@ impl Lights {
 /// Whether a ray meets at most one light that shines back along it, as far as the recognized arrangements go.
 fn is_crossed_once(lights: &[LightTriangle]) -> bool {
     let mut planes: Vec<Plane> = Vec::new();
-    let mut members = Vec::with_capacity(lights.len());
+    let mut members = Vec::new();
     for light in lights {
-        let Some(face) = Face::new(light) else { return false };
-        let number = match planes.iter().position(|plane| plane.holds(&face)) {
-            Some(number) => number,
-            None if planes.len() == MAX_PLANES => return false,
-            None => {
-                members.push((planes.len(), light));
-                planes.push(Plane { is_two_sided: face.is_two_sided, face });
-                continue;
-            }
-        };
-        let plane = &mut planes[number];
-        plane.is_two_sided |= face.is_two_sided || plane.face.normal.dot(face.normal) < 0.0;
+        let Some(own) = Plane::new(light) else { return false };
+        let number = planes.iter().position(|plane| plane.holds(light)).unwrap_or(planes.len());
         members.push((number, light));
+        match planes.get_mut(number) {
+            Some(plane) => plane.is_two_sided |= own.is_two_sided || plane.normal.dot(own.normal) < 0.0,
+            None if number == MAX_PLANES => return false,
+            None => planes.push(own),
+        }
     }
     is_convex(&planes, lights) && are_apart(&planes, members)
 }
 
-/// Whether all lights are on the front side of all planes.
+/// Whether all lights face into one convex body, or lie in one plane.
 fn is_convex(planes: &[Plane], lights: &[LightTriangle]) -> bool {
-    planes.len() <= 1
-        || planes.iter().all(|plane| {
-            let is_in_front = |light| {
-                Face::new(light).is_some_and(|face| {
-                    let [low, _, rounding] = plane.heights(&face);
-                    low >= -rounding
-                })
-            };
-            !plane.is_two_sided && lights.iter().all(is_in_front)
-        })
+    let is_face = |plane: &Plane| !plane.is_two_sided && lights.iter().all(|light| plane.is_in_front(light));
+    planes.len() <= 1 || planes.iter().all(is_face)
 }
 
 /// A light in the coordinates of its plane.
@@ -167,7 +158,7 @@ impl FlatFace {
 
 /// Whether no two lights of one plane overlap. Sweeps across each plane along its first axis.
 fn are_apart(planes: &[Plane], members: Vec<(usize, &LightTriangle)>) -> bool {
-    let flat = |(plane, light): (usize, &LightTriangle)| FlatFace::new(plane, planes[plane].face.normal, light);
+    let flat = |(plane, light): (usize, &LightTriangle)| FlatFace::new(plane, planes[plane].normal, light);
     let mut faces: Vec<FlatFace> = members.into_iter().map(flat).collect();
     faces.sort_unstable_by(|a, b| {
         (a.plane, a.low[0]).partial_cmp(&(b.plane, b.low[0])).unwrap_or(core::cmp::Ordering::Equal)

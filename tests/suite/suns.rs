@@ -2,7 +2,9 @@
 
 use crate::common::pcg::Pcg32;
 use crate::common::tier::some;
-use fanlight::{Environment, Filter, LightSample, LightSampler, Mesh, ShadingPoint, Splitting, Texture, Weight};
+use fanlight::{
+    Environment, Filter, Hit, LightSample, LightSampler, Mesh, Receiver, ShadingPoint, Splitting, Texture, Weight,
+};
 use glam::{Vec2, Vec3};
 use smallvec::SmallVec;
 
@@ -200,6 +202,27 @@ fn openings_as_small_as_the_sun() {
 #[test]
 fn openings_without_number() {
     check_irradiance(Wall::Holes(150), 10.0);
+}
+
+/// A ray to an edge may pass the opening by rounding. The point has the sun's density all the same.
+#[test]
+fn points_on_edges_of_openings_see_the_sun() {
+    let lights = Wall::Holes(150).build();
+    let x = points().into_iter().find(|x| x.receiver == Receiver::Volume).expect("one is in a volume");
+    let here = lights.at(&x);
+    let mut pcg = Pcg32::new(5, 31);
+    let (mut found, mut lost) = (0, 0);
+    for _ in 0..3000 {
+        let Some(sample) = here.sample(pcg.cube()) else { continue };
+        let hit = sample.hit().expect("a triangle");
+        let [b1, _] = hit.barycentrics;
+        let densities = [1e-3, 2e-7, 0.0].map(|b2| here.pdf(&Hit::new(hit.triangle, [b1, b2])));
+        found += u32::from(densities[0] > 100.0);
+        lost += u32::from(densities[0] > 100.0 && densities[1].min(densities[2]) < 0.1 * densities[0]);
+    }
+    assert!(found > 300, "only {found} openings before the sun");
+    // Between the two points the sun may end.
+    assert!(20 * lost < found, "{lost} of {found}");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use glam::{Mat3, Vec3, vec3};
 use super::*;
 use crate::blas::Root;
 use crate::geometry;
+use crate::testing::Pcg32;
 
 /// A parallelogram of two triangles, with its front to `u × v`.
 fn quad(corner: Vec3, u: Vec3, v: Vec3) -> Vec<LightTriangle> {
@@ -101,14 +102,10 @@ fn a_wall_of_many_windows_is_recognized() {
 #[test]
 fn rays_agree() {
     let lights = room();
-    let mut state = 7_u32;
-    let mut number = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 24)
-    };
+    let mut pcg = Pcg32::new(7, 1);
     let mut met = 0;
     for _ in 0..20_000 {
-        let mut point = || DVec3::new(number(), number(), number()) * 8.0 - 2.0;
+        let mut point = || Vec3::from([(); 3].map(|()| pcg.next_f32())).as_dvec3() * 8.0 - 2.0;
         let (from, to) = (point(), point());
         let direction = (to - from).as_vec3();
         let count = lights

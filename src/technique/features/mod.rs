@@ -133,8 +133,9 @@ impl Technique for VisibleFeatures {
                 continue;
             }
             let per_excess = if visible.leaf == ANY_PORTAL {
-                // On an edge, rounding may take the ray past the very light that the point lies on.
-                let is_least = least_crossed(at, direction).is_none_or(|least| least.leaf >= leaf);
+                // On an edge, rounding may take the ray past the very light that the point lies on, or to its neighbor.
+                let is_least = at.scene.lights.is_crossed_once
+                    || least_crossed(at, direction).is_none_or(|least| least.leaf >= leaf);
                 if is_least { 1.0 / f64::from(environment.feature_nodes()[node].power) } else { 0.0 }
             } else if visible.part.cell.holds(point) {
                 FeatureView::new(triangle, environment, node).pdf_per_excess(visible.part, point)
