@@ -9,6 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::feature_texel::FeatureTexel;
+use crate::math;
 
 /// Most blocks of a leaf. Chosen by the bench `instructions`, not swept.
 ///
@@ -26,6 +27,8 @@ pub(crate) struct FeatureNode {
     pub(crate) axis: [f32; 3],
     /// Sine of the angular radius of a cone around the center that holds all blocks. 1: all directions.
     pub(crate) sin_radius: f32,
+    /// Sine of the angular radius of the disk of even radiance that is spread as far around the center.
+    pub(crate) sin_spread: f32,
     /// Excess over the cap, integrated over solid angle.
     pub(crate) power: f32,
     /// Start and end of the blocks in the list of all.
@@ -36,7 +39,7 @@ pub(crate) struct FeatureNode {
     pub(crate) is_single: u32,
 }
 
-const _: () = assert!(size_of::<FeatureNode>() == 36);
+const _: () = assert!(size_of::<FeatureNode>() == 40);
 
 /// Builds the tree from the blocks of each feature. Returns it with the blocks in its order.
 pub(super) fn feature_tree(features: Vec<Vec<FeatureTexel>>) -> (Vec<FeatureNode>, Vec<FeatureTexel>) {
@@ -139,10 +142,21 @@ impl Tree {
             // Beyond 72 degrees sines say little, and beyond a right angle nothing.
             sin.max(if axis.dot(center) > 0.3 && reach < 0.95 { reach } else { 1.0 })
         });
+        let sin_spread = spread(axis, blocks, power).min(sin_radius);
+        let (axis, range, next) = (axis.to_array(), [start, end], next as u32);
         let node = &mut self.nodes[node];
-        *node =
-            FeatureNode { axis: axis.to_array(), sin_radius, power, range: [start, end], next: next as u32, ..*node };
+        *node = FeatureNode { axis, sin_radius, sin_spread, power, range, next, ..*node };
     }
+}
+
+/// Returns the sine of the radius of the disk with the blocks' mean square distance from an axis: that of a disk is half of its
+/// radius squared. A block adds a third of its half diagonal squared.
+fn spread(axis: Vec3, blocks: &[FeatureTexel], power: f32) -> f32 {
+    let square = |block: &FeatureTexel| {
+        let own = block.radius * block.radius / 3.0;
+        block.power() / power * (axis.cross(Vec3::from_array(block.center)).length_squared() + own)
+    };
+    math::sqrt(2.0 * blocks.iter().map(square).sum::<f32>())
 }
 
 fn bounds(points: impl Iterator<Item = Vec3>) -> (Vec3, Vec3) {

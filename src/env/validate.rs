@@ -168,7 +168,7 @@ fn check_order(start: usize, texels: &[FeatureTexel]) -> Result<(), Error> {
 /// Checks one node of the tree over the bright features. Where each passes, they are one tree: the children of each share
 /// its nodes and its blocks.
 fn check_node(i: usize, nodes: &[FeatureNode], texels: &[FeatureTexel]) -> Result<(), Error> {
-    let FeatureNode { axis, sin_radius, power, range, next, is_single } = nodes[i];
+    let FeatureNode { axis, sin_radius, sin_spread, power, range, next, is_single } = nodes[i];
     let [start, stop] = range.map(|at| at as usize);
     let end = next as usize;
     if start >= stop || stop > texels.len() {
@@ -183,6 +183,9 @@ fn check_node(i: usize, nodes: &[FeatureNode], texels: &[FeatureTexel]) -> Resul
     }
     if !(sin_radius > 0.0 && sin_radius <= 1.0) {
         return Err(wrong("the radius of a bright feature", i, bits(sin_radius), bits(1.0)));
+    }
+    if !(sin_spread > 0.0 && sin_spread <= sin_radius) {
+        return Err(wrong("the spread of a bright feature", i, bits(sin_spread), bits(sin_radius)));
     }
     if is_single > 1 {
         return Err(wrong("the kind of a bright feature", i, u64::from(is_single), 1));

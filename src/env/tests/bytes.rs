@@ -83,9 +83,10 @@ fn features_that_cannot_be_sampled_are_refused() {
     assert_eq!((parts.features.len(), parts.feature_texels.len()), (1, 2));
     assert!(!is_refused(parts, |_, _| ()));
     for value in [f32::NAN, f32::INFINITY, -1.0, 1e31] {
-        let changes: [fn(&mut FeatureNode, &mut [FeatureTexel], f32); 9] = [
+        let changes: [fn(&mut FeatureNode, &mut [FeatureTexel], f32); 10] = [
             |feature, _, value| feature.axis[1] = value,
             |feature, _, value| feature.sin_radius = value,
+            |feature, _, value| feature.sin_spread = value,
             |feature, _, value| feature.power = value,
             |_, texels, value| texels[1].cap = value,
             |_, texels, value| texels[1].excess = value,

@@ -31,6 +31,12 @@ const ASIDE_ROUNDING: f32 = 1e-5;
 /// Larger and smaller as [`ASIDE_ROUNDING`].
 const SQUARE_ROUNDING: f32 = 3e-6;
 
+/// Least share of a cell that counts as covered by a feature that may be visible through it. *Chosen*.
+///
+/// Larger: openings beside the feature count. Smaller: one that shows the feature's edge, and nothing else does, is listed
+/// with next to no weight.
+const LEAST_SHARE: f32 = 0.05;
+
 /// A part of a triangle through which a feature is visible.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeaturePart {
@@ -112,25 +118,24 @@ impl<'a> FeatureView<'a> {
             return;
         }
         let averages = blas::averages(self.triangle.cells, below.node);
-        let apart = self.are_apart(&corners);
-        for (i, average) in averages.into_iter().enumerate().filter(|(i, _)| !apart[*i]) {
+        let shares = self.covered_shares(&corners);
+        for (i, average) in averages.into_iter().enumerate().filter(|(i, _)| shares[*i] > 0.0) {
             let root = Root { average: average * scale, node: blas::below(self.triangle.cells, below.node, i) };
             self.visit_below((cell.child(i), blas::child_corners(&corners, i)), root, scale, found);
         }
     }
 
-    /// Mean of the relative averages of those children of a cell that the feature may be visible through.
+    /// Mean of the relative averages of those children of a cell that the feature may be visible through, each counted by
+    /// the share of it that the feature covers.
     fn average_before_feature(&self, corners: &[Vec3; 3], node: u32) -> f32 {
         let averages = blas::averages(self.triangle.cells, node);
-        let apart = self.are_apart(corners);
-        let (mut sum, mut count) = (0.0, 0.0);
-        for (average, apart) in averages.into_iter().zip(apart) {
-            if !apart {
-                sum += average;
-                count += 1.0;
-            }
+        let shares = self.covered_shares(corners);
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (average, share) in averages.into_iter().zip(shares) {
+            sum += average * share;
+            all += share;
         }
-        if count > 0.0 { sum / count } else { 0.0 }
+        if all > 0.0 { sum / all } else { 0.0 }
     }
 
     /// Draws a point in a part.
@@ -170,12 +175,13 @@ impl<'a> FeatureView<'a> {
         &self.environment.feature_nodes()[self.node]
     }
 
-    /// Which children of a cell are so far from the feature's axis that nothing of the feature is visible through them: a
-    /// quick test that decides about most.
+    /// Estimates the share of each child of a cell that the feature covers. It is zero only where nothing of the feature is
+    /// visible through the child: a quick test that decides about most.
     ///
     /// The directions to a child lie in a cone around that to its center. Where the sines of the radii of two cones add up
-    /// to less than that of the angle between their axes, or than 1 for an obtuse angle, the cones are apart.
-    fn are_apart(&self, corners: &[Vec3; 3]) -> [bool; ARITY] {
+    /// to less than that of the angle between their axes, or than 1 for an obtuse angle, the cones are apart. In between, the
+    /// share grows evenly from cones that touch to one that holds the other, with a disk as wide as the feature is spread.
+    fn covered_shares(&self, corners: &[Vec3; 3]) -> [f32; ARITY] {
         let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
         let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
         let extent = self.triangle.vertices().iter().fold(0.0, |extent: f32, v| extent.max(v.abs().max_element()));
@@ -183,20 +189,23 @@ impl<'a> FeatureView<'a> {
         let (axis, sine) = (Vec3::from_array(self.bright().axis), self.bright().reach());
         let [v0, v1, v2] = corners.map(|corner| self.environment.local_direction(corner));
         let (e1, e2) = (v1 - v0, v2 - v0);
-        let mut apart = [false; ARITY];
-        for (i, apart) in apart.iter_mut().enumerate() {
+        let (spread, per_radius) = (self.bright().sin_spread, 0.5 / radius);
+        let mut shares = [0.0; ARITY];
+        for (i, share) in shares.iter_mut().enumerate() {
             let (b1, b2) = (CHILD_CENTERS.b1[i], CHILD_CENTERS.b2[i]);
             let x = v0.x + (e1.x * b1 + e2.x * b2);
             let y = v0.y + (e1.y * b1 + e2.y * b2);
             let z = v0.z + (e1.z * b1 + e2.z * b2);
             let along = axis.x * x + axis.y * y + axis.z * z;
             let distance2 = x * x + y * y + z * z;
-            let reach = radius + sine * math::sqrt(distance2);
+            let distance = math::sqrt(distance2);
+            let reach = radius + sine * distance;
             let reach2 = reach * reach + SQUARE_ROUNDING * distance2;
-            let across2 = distance2 - if along > 0.0 { along * along } else { 0.0 };
-            *apart = reach2 < across2;
+            let across2 = (distance2 - if along > 0.0 { along * along } else { 0.0 }).max(0.0);
+            let covered = ((radius + spread * distance - math::sqrt(across2)) * per_radius).clamp(LEAST_SHARE, 1.0);
+            *share = if reach2 < across2 { 0.0 } else { covered };
         }
-        apart
+        shares
     }
 
     /// Corners of a cell, relative to the shading point.
@@ -225,8 +234,9 @@ impl CellTarget for FeatureView<'_> {
     fn child(&self, (): &(), _index: usize) {}
 
     fn weigh_children(&self, at: LatticeCell, (): &(), averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
-        let apart = self.are_apart(&self.corners(at));
-        *weights = core::array::from_fn(|i| if averages[i] == 0.0 || apart[i] { 0.0 } else { self.power(at.child(i)) });
+        let shares = self.covered_shares(&self.corners(at));
+        let may_show = |i: usize| averages[i] != 0.0 && shares[i] > 0.0;
+        *weights = core::array::from_fn(|i| if may_show(i) { self.power(at.child(i)) } else { 0.0 });
     }
 
     fn is_final(&self, _at: LatticeCell, (): &mut (), _levels: Option<u32>) -> bool {
