@@ -33,16 +33,6 @@ pub(crate) fn floor_to_i64(x: f64) -> i64 {
     truncated.saturating_sub(i64::from(x < truncated as f64))
 }
 
-/// Angle in `[0, π]` whose cosine is `x`, which is first clamped to `[-1, 1]`.
-#[inline]
-pub(crate) fn acos(x: f32) -> f32 {
-    let x = x.clamp(-1.0, 1.0);
-    #[cfg(feature = "std")]
-    return x.acos();
-    #[cfg(not(feature = "std"))]
-    return libm::acosf(x);
-}
-
 /// Angle in `[-π/2, π/2]` whose sine is `x`, which is first clamped to `[-1, 1]`.
 #[inline]
 pub(crate) fn asin(x: f32) -> f32 {
