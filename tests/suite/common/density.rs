@@ -56,6 +56,8 @@ pub(crate) struct OnTriangle<'a> {
     /// Times the triangle's area, over the distance cubed: from solid angle to the unit of the triangle.
     height_area: f64,
     is_by_angle: bool,
+    /// Factor on [`HEAVY`] and [`NEGLIGIBLE_DOUBT`].
+    coarser: f64,
     deepest: u32,
     most: usize,
     enough: f64,
@@ -70,7 +72,17 @@ impl<'a> OnTriangle<'a> {
         // |n·a| / |n| · |n| / 2.
         let height_area = 0.5 * (b - a).cross(c - a).dot(a).abs();
         let (deepest, most, enough) = (DEEPEST, usize::MAX, 0.0);
-        let on = Self { id: id(triangle), vertices, height_area, is_by_angle: false, deepest, most, enough, pdf };
+        let on = Self {
+            id: id(triangle),
+            vertices,
+            height_area,
+            is_by_angle: false,
+            coarser: 1.0,
+            deepest,
+            most,
+            enough,
+            pdf,
+        };
         Self { is_by_angle: on.is_constant_by_angle(), ..on }
     }
 
@@ -79,6 +91,12 @@ impl<'a> OnTriangle<'a> {
     /// standard error.
     pub(crate) fn limits(self, deepest: u32, most: usize, enough: f64) -> Self {
         Self { deepest, most, enough, ..self }
+    }
+
+    /// Leaves cells undivided that are so many times as probable, or so many times as much in doubt, whichever way the density
+    /// is constant.
+    pub(crate) fn coarser(self, factor: f64) -> Self {
+        Self { coarser: factor, ..self }
     }
 
     /// Whether neighboring points have the same density per solid angle rather than per area: a majority of pairs.

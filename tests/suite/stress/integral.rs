@@ -5,6 +5,7 @@ use fanlight::{Hit, LightSample, ShadingPoint};
 use super::rows::Row;
 use crate::common::density::{OnTriangle, id, probes};
 use crate::common::lights::Point;
+use crate::common::parallel;
 
 /// Triangles that together have less probability than this are left out of an integral.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -14,6 +15,8 @@ const ENOUGH: f64 = 1e-5;
 const DEEPEST: u32 = 20;
 /// Triangles of a large scene that are integrated over.
 const SOME: usize = 8;
+/// Triangles that a thread takes at a time.
+const CHUNK: usize = 4096;
 
 fn over_triangle(
     row: &Row,
@@ -61,7 +64,10 @@ pub(crate) fn all(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSamp
 
 /// The sum of all triangles' probabilities, times what the integral over some that were drawn is of theirs.
 pub(crate) fn some(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSample], cells: usize) -> (f64, f64) {
-    let total: f64 = row.scene.triangles().map(|t| f64::from(at.pmf(id(t)))).sum();
+    let triangles: Vec<_> = row.scene.triangles().collect();
+    let chunks: Vec<_> = triangles.chunks(CHUNK).collect();
+    let sum = |chunk: &[(usize, usize)]| chunk.iter().map(|&t| f64::from(at.pmf(id(t)))).sum::<f64>();
+    let total: f64 = parallel::map(chunks.len(), |i| sum(chunks[i])).iter().sum();
     let some: Vec<_> = kept.iter().take(SOME).map(|sample| sample.hit().expect("a triangle").triangle).collect();
     let (mut ratio, mut variance) = (0.0, 0.0);
     for triangle in &some {

@@ -19,7 +19,7 @@ const IRRADIANCE: f64 = 1e-3;
 /// Every arity, with lights of one and of two sides.
 const VARIANTS: usize = 2 * ARITIES.len();
 const RECEIVERS: usize = 3;
-/// A combination that misses a bar is done again with so many times the samples.
+/// A combination that misses a bar is done again with so many times the samples and cells.
 const AGAIN: usize = 16;
 
 /// The worst of all receivers and variants.
@@ -70,8 +70,8 @@ fn run(number: usize, plan: &Plan) -> (&'static str, Vec<Cell>) {
             let seed = (number * cells.len() + column) as u64;
             let mut found = measure(&row, &at, &x, effort, seed);
             if !found.misses().is_empty() {
-                // More samples tell an error from chance.
-                let more = Effort { points: AGAIN * effort.points, ..effort };
+                // More samples and cells tell an error from chance.
+                let more = Effort { points: AGAIN * effort.points, cells: AGAIN * effort.cells, ..effort };
                 found = measure(&row, &at, &x, more, 1000 + seed);
                 repeated += 1;
             }

@@ -133,7 +133,13 @@ fn agreement(
 ) -> Vec<LightSample> {
     let mut kept = Vec::new();
     // Each may cross all of the triangles.
-    let directions = if is_many(row) { effort.directions.min(4) } else { effort.directions };
+    let directions = if row.large {
+        1
+    } else if is_many(row) {
+        effort.directions.min(4)
+    } else {
+        effort.directions
+    };
     for i in 0..effort.samples {
         let is_hostile = i % 8 == 0;
         let u = pcg.cube().map(|u| if is_hostile && pcg.below(2) == 0 { HOSTILE[pcg.below(HOSTILE.len())] } else { u });

@@ -131,7 +131,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         let quarters = cell.quarters();
         let values = quarters.map(|q| self.on.density(middle(q)));
         let densest = values.iter().fold(0.0, |densest: f64, value| densest.max(value.by_area()));
-        if !self.on.is_limited() && cell.depth < self.on.deepest && cell.share() * densest > HEAVY {
+        if !self.on.is_limited() && cell.depth < self.on.deepest && cell.share() * densest > self.on.coarser * HEAVY {
             return self.divide(cell);
         }
         let are_equal = range(values.iter().map(|v| v.pdf)) == 0.0 || range(values.iter().map(|v| v.by_area())) == 0.0;
@@ -153,7 +153,8 @@ impl<'a, 'b> Walk<'a, 'b> {
             solid_angle: self.on.solid_angle(cell.corners, share),
         };
         let key = range.doubt(share);
-        let is_small = !self.on.is_limited() && self.on.is_by_angle && key < NEGLIGIBLE_DOUBT;
+        let may_be_small = !self.on.is_limited() && (self.on.is_by_angle || self.on.coarser > 1.0);
+        let is_small = may_be_small && key < self.on.coarser * NEGLIGIBLE_DOUBT;
         if key == 0.0 || is_small || cell.depth >= self.on.deepest {
             self.settle(&cell, range, &values);
         } else {
