@@ -82,8 +82,8 @@ impl Groups {
         let environment = &at.scene.environment;
         let sin_radius = environment.feature_nodes()[node].sin_radius;
         let cosine = at.x.receiver.mean_over_cone(environment.feature_axis(node), sin_radius);
-        // A cone that may hold everything has no horizon; its mean is that of a sphere.
-        let cosine = if sin_radius < 1.0 { cosine } else { 0.25 };
+        // A cone that may hold everything has no horizon, and at least the mean of a sphere.
+        let cosine = if sin_radius < 1.0 { cosine } else { cosine.max(0.25) };
         if cosine > 0.0 {
             self.groups[self.len] = Group { node: node as u32, cosine };
             self.len += 1;
