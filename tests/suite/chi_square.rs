@@ -50,6 +50,7 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
         }
     }
     let probes = probes(&scene, &kept);
+    let at = lights.at(&x);
     let pdf = |hit: &Hit| {
         // Integrates to one as well: the parts are a quarter and three quarters of a triangle.
         let factor = if !wrong {
@@ -59,7 +60,7 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
         } else {
             0.95
         };
-        factor * f64::from(lights.at(&x).pdf(hit))
+        factor * f64::from(at.pdf(hit))
     };
     let mut expected = Vec::with_capacity(observed.len());
     for triangle in scene.triangles() {

@@ -111,6 +111,9 @@ fn the_density_is_that_of_the_samples() {
     assert!(drawn > 1000 * SCENES, "only {drawn} samples");
 }
 
+/// How much coarser the integrals are than those of scenes that stay as they are. What they leave open is tolerated.
+const COARSER: f64 = 5.0;
+
 /// Volumes see every two-sided light, so nothing can be missed.
 #[test]
 fn the_density_integrates_to_one() {
@@ -125,16 +128,17 @@ fn the_density_integrates_to_one() {
         let drawn: Vec<_> = (0..20_000).filter_map(|_| lights.at(&x).sample(pcg.cube())).collect();
         let missed = 1.0 - drawn.len() as f64 / 20_000.0;
         let probes = probes(&other, &drawn[..drawn.len().min(2000)]);
-        let pdf = |hit: &Hit| f64::from(lights.at(&x).pdf(hit));
+        let at = lights.at(&x);
+        let pdf = |hit: &Hit| f64::from(at.pdf(hit));
         let (mut sum, mut unresolved, mut pmfs) = (0.0, 0.0, 0.0);
         for (m, t) in other.triangles() {
-            let on = OnTriangle::new(&other, (m, t), &x, &pdf);
+            let on = OnTriangle::new(&other, (m, t), &x, &pdf).coarser(COARSER);
             let (whole, open) = on.integrate(0, 4, &probes[m][t]);
             sum += whole[0];
-            unresolved += open;
-            pmfs += f64::from(lights.at(&x).pmf(id((m, t))));
+            unresolved += open * open;
+            pmfs += f64::from(at.pmf(id((m, t))));
         }
-        (other.name, sum, unresolved, missed, pmfs)
+        (other.name, sum, unresolved.sqrt(), missed, pmfs)
     });
     for (name, sum, unresolved, missed, pmfs) in found {
         let tolerance = 1e-4 + unresolved + 4.0 * (missed * (1.0 - missed) / 20_000.0).sqrt();

@@ -38,6 +38,9 @@ pub(super) struct Open {
     pub(super) values: [Density; 4],
 }
 
+/// Ratio of the largest to the least scale in a cell up to which its solid angle helps.
+const MOST_SCALES: f64 = 2.0;
+
 /// Differences of the largest and the least density that were seen in a cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Range {
@@ -192,7 +195,13 @@ impl<'a, 'b> Walk<'a, 'b> {
             })
         });
         let mean = |value: fn(Density) -> f64| values.as_flattened().iter().map(|v| value(*v)).sum::<f64>() / 8.0;
-        let (value, unit): (fn(Density) -> f64, f64) = if range.is_by_angle(share) {
+        // Their quotient is biased where the scale varies much.
+        let (least, largest) = values
+            .as_flattened()
+            .iter()
+            .fold((f64::INFINITY, 0.0f64), |(least, largest), v| (least.min(v.scale), largest.max(v.scale)));
+        let is_by_angle = range.is_by_angle(share) && largest <= MOST_SCALES * least;
+        let (value, unit): (fn(Density) -> f64, f64) = if is_by_angle {
             // Weighed by the solid angle that each place stands for, whose sum is known.
             (|v| v.pdf, range.solid_angle)
         } else {
@@ -202,7 +211,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             // Of the mean of the two, with the share of a quarter.
             self.variance += (unit * (value(first) - value(second))).powi(2) / 64.0;
         }
-        if range.is_by_angle(share) {
+        if is_by_angle {
             unit * mean(Density::by_area) / mean(|v| v.scale).max(f64::MIN_POSITIVE)
         } else {
             unit * mean(Density::by_area)
