@@ -119,7 +119,8 @@ fn contents(two_sided: bool, slow: bool) -> Vec<Content> {
 /// Volumes see every two-sided light, and no sky without a black pixel hides one: nothing can be missed.
 fn check_where_all_is_visible(slow: bool) {
     let contents: Vec<_> = contents(true, slow).into_iter().filter(|content| content.sky < 2).collect();
-    let found = parallel::map(contents.len(), |i| examine(contents[i], 1000 + i, 2, 5000, false));
+    let numbers = some(contents.len());
+    let found = parallel::map(numbers.len(), |k| examine(contents[numbers[k]], 1000 + numbers[k], 2, 5000, false));
     let mut worst = 0.0f64;
     for found in &found {
         assert_eq!(found.missed, 0, "{}", found.name);
