@@ -35,12 +35,13 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     }
     let mut observed = vec![0.0; total * bins + 1];
     let mut kept = Vec::new();
+    let at = lights.at(&x);
     for _ in 0..samples {
-        match lights.at(&x).sample(pcg.cube()) {
+        match at.sample(pcg.cube()) {
             Some(sample) => {
-                let triangle = firsts[sample.hit().expect("a triangle").triangle.mesh.index() as usize]
-                    + sample.hit().expect("a triangle").triangle.triangle as usize;
-                let count = &mut observed[triangle * bins + bin(sample.hit().expect("a triangle").barycentrics, DEPTH)];
+                let hit = sample.hit().expect("a triangle");
+                let triangle = firsts[hit.triangle.mesh.index() as usize] + hit.triangle.triangle as usize;
+                let count = &mut observed[triangle * bins + bin(hit.barycentrics, DEPTH)];
                 *count += 1.0;
                 if *count <= PROBES {
                     kept.push(sample);
@@ -50,7 +51,6 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
         }
     }
     let probes = probes(&scene, &kept);
-    let at = lights.at(&x);
     let pdf = |hit: &Hit| {
         // Integrates to one as well: the parts are a quarter and three quarters of a triangle.
         let factor = if !wrong {
@@ -66,7 +66,7 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     for triangle in scene.triangles() {
         let on = OnTriangle::new(&scene, triangle, &x, &pdf);
         // The more probable a triangle, the finer what may be missed in it.
-        let least_depth = match lights.at(&x).pmf(id(triangle)) {
+        let least_depth = match at.pmf(id(triangle)) {
             pmf if pmf > 0.05 => 6,
             pmf if pmf > 1e-4 => 4,
             _ => 2,
