@@ -307,3 +307,51 @@ fn any_number_of_lamps_is_sampled_as_well_as_a_few() {
         before = Some(deviation);
     }
 }
+
+/// A row of panes with narrow bars between them, in the window's place.
+fn panes(count: usize, environment: &Environment) -> LightSampler {
+    let mut builder = LightSampler::builder().environment(environment.clone());
+    for [from, to] in (0..count).map(|i| pane(i, count)) {
+        let corners = [[from, 1.0], [to, 1.0], [to, 2.0], [from, 2.0]].map(|[x, z]| Vec3::new(x, 0.0, z));
+        builder.add_mesh(&Mesh::portal(&corners, &[[0, 1, 2], [0, 2, 3]])).expect("the pane is sound");
+    }
+    builder.build().expect("the scene is sound")
+}
+
+/// Where a pane begins and ends.
+fn pane(i: usize, count: usize) -> [f32; 2] {
+    [0.0, 0.9].map(|share| -0.5 + (i as f32 + share) / count as f32)
+}
+
+/// The list of parts has room for what few panes show of 32 lamps, one by one, and not for what many do.
+#[test]
+fn any_number_of_panes_is_sampled_as_well_as_a_few() {
+    let environment = lamps(32);
+    let x = ShadingPoint::surface(Vec3::new(0.0, -1.5, 0.5), Vec3::new(0.0, 0.6, 0.8));
+    let mut pcg = Pcg32::new(6, 31);
+    for count in [2, 8, 9, 16, 32, 64] {
+        let is_open = |direction: Vec3| {
+            let hit = x.position + direction * (1.5 / direction.y);
+            let is_pane = |[from, to]: [f32; 2]| (from..=to).contains(&hit.x);
+            direction.y > 0.0 && (1.0..=2.0).contains(&hit.z) && (0..count).map(|i| pane(i, count)).any(is_pane)
+        };
+        let (mean, error) = estimate(100_000, || {
+            let [u, v, _] = pcg.cube();
+            let sample = environment.sample([u, v]).expect("the sky is not black");
+            let value = f64::from(sample.radiance * x.cosine(sample.direction) / sample.pdf);
+            if is_open(sample.direction) { value } else { 0.0 }
+        });
+        let lights = panes(count, &environment);
+        let here = lights.at(&x);
+        let n = 4000;
+        let (found, own_error) = estimate(n, || {
+            let Some(sample) = here.sample(pcg.cube()) else { return 0.0 };
+            let value = f64::from(environment.radiance(sample.direction) * x.cosine(sample.direction));
+            value / f64::from(here.pdf_sample_direction(&sample))
+        });
+        assert!((found - mean).abs() < 5.0 * (error + own_error), "{count}: {found} instead of {mean}");
+        let relvar = n as f64 * (own_error / found).powi(2);
+        println!("{count} panes: relative variance {relvar:.3}");
+        assert!(relvar < 0.05, "{count} panes: {relvar}");
+    }
+}

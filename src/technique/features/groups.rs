@@ -9,16 +9,11 @@ use crate::technique::Viewpoint;
 /// each other share a group, and with it the cosine.
 pub(super) const MAX_GROUPS: usize = 32;
 
-/// Largest angular radius of a group of several features, as a sine, where there are few lights. Chosen on skies of many
-/// lamps, not swept.
+/// Largest angular radius of a group of several features, as a sine. Chosen on skies of many lamps, not swept; against groups
+/// of one feature, measured (docs/ACCURACY.md, "Bright features").
 ///
 /// Larger: the cosine varies within a group. Smaller: more walks down the tree over the lights.
 const GROUP_RADIUS: f32 = 0.12;
-
-/// Most lights for which features share a group. Chosen on windows and lattices, not swept.
-///
-/// Larger: each of many small openings is looked at for all features of a group. Smaller: more walks down the tree.
-const FEW_LIGHTS: usize = 16;
 
 /// A group of features that may be visible.
 #[derive(Clone, Copy, Debug, Default)]
@@ -55,9 +50,8 @@ impl Groups {
     #[inline(never)]
     fn divide(&mut self, at: &Viewpoint<'_>) {
         let nodes = at.scene.environment.feature_nodes();
-        let narrow = if at.scene.lights.len() <= FEW_LIGHTS { GROUP_RADIUS } else { 0.0 };
         while self.len < MAX_GROUPS {
-            let (mut widest, mut radius) = (None, narrow);
+            let (mut widest, mut radius) = (None, GROUP_RADIUS);
             for (i, group) in self.as_slice().iter().enumerate() {
                 let node = &nodes[group.node as usize];
                 if node.is_single == 0 && node.sin_radius > radius {
