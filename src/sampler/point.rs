@@ -1,5 +1,7 @@
 //! The lights as seen from one shading point: the one door to samples and densities.
 
+use core::cell::{Ref, RefCell};
+
 use glam::Vec3;
 
 use super::finite::{to_finite, to_positive};
@@ -18,13 +20,15 @@ const ENVIRONMENT_DISTANCE: f32 = 1e15;
 
 /// The lights as seen from one shading point: made by [`LightSampler::at`](crate::LightSampler::at).
 ///
-/// What all questions about one point share is found out once, when it is made; above all which bright features of the
-/// environment are visible through the portals.
+/// What all questions about one point share is found out once, by the first of them; above all which bright features of the
+/// environment are visible through the portals. A sampler is made for one point and one thread, and costs next to nothing
+/// where nothing is asked of it.
 #[derive(Debug)]
 #[must_use]
 pub struct PointSampler<'a> {
     at: Viewpoint<'a>,
-    mixture: Mixture,
+    /// Completed in place: a mixture is large, and one that a function returns is copied.
+    mixture: RefCell<Mixture>,
 }
 
 impl<'a> PointSampler<'a> {
@@ -33,9 +37,24 @@ impl<'a> PointSampler<'a> {
     /// To be called with a literal, and itself a literal: what goes through a variable is copied, and a sampler is large.
     #[inline(always)]
     pub(super) fn new(at: Viewpoint<'a>) -> Self {
-        let mut sampler = Self { mixture: Mixture::of_trees(), at };
-        sampler.mixture.look_beside(&sampler.at);
-        sampler
+        Self { mixture: RefCell::new(Mixture::of_trees()), at }
+    }
+
+    /// Returns the techniques at this point.
+    #[inline(always)]
+    fn mixture(&self) -> Ref<'_, Mixture> {
+        if self.at.scene.has_more_than_trees() {
+            self.look_beside();
+        }
+        self.mixture.borrow()
+    }
+
+    /// Finds out what there is besides the trees, the first time it is called.
+    #[inline(never)]
+    fn look_beside(&self) {
+        if let Ok(mut mixture) = self.mixture.try_borrow_mut() {
+            mixture.look_beside(&self.at);
+        }
     }
 
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the
@@ -45,7 +64,8 @@ impl<'a> PointSampler<'a> {
     /// of zero. The densities of all points integrate to the probability of not getting `None`.
     #[must_use]
     pub fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
-        let mixed = self.mixture.one();
+        let mixture = self.mixture();
+        let mixed = mixture.one();
         let mut variates = Variates::new(u);
         if mixed.chooses_sky(&mut variates.choice) {
             return self.sample_environment(&mixed, variates.point);
@@ -72,7 +92,7 @@ impl<'a> PointSampler<'a> {
     /// Draws a point on a light that the tree has chosen.
     #[inline(always)]
     pub(super) fn sample_on(&self, chosen: (u32, f64), u: [Variate; 2]) -> Option<LightSample> {
-        self.mixture.one().sample_on(&self.at, chosen, u, |drawn, view| light_sample(&self.at, drawn, view))
+        self.mixture().one().sample_on(&self.at, chosen, u, |drawn, view| light_sample(&self.at, drawn, view))
     }
 
     /// Moves the sampler to another shading point from which no bright feature is visible either.
@@ -86,7 +106,7 @@ impl<'a> PointSampler<'a> {
     /// Where a ray can cross several portals, what a host needs is [`Self::pdf_direction`].
     #[must_use]
     pub fn pdf(&self, hit: &Hit) -> f32 {
-        self.pdf_of_hit(hit, &self.mixture.one())
+        self.pdf_of_hit(hit, &self.mixture().one())
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] draws this direction of the environment, where that is
@@ -97,7 +117,7 @@ impl<'a> PointSampler<'a> {
     /// ray can cross portals, what a host needs is [`Self::pdf_direction`].
     #[must_use]
     pub fn pdf_environment(&self, direction: Vec3) -> f32 {
-        to_finite(self.environment_density(direction, &self.mixture.one()))
+        to_finite(self.environment_density(direction, &self.mixture().one()))
     }
 
     /// Returns the probability with which the trees choose this triangle, in `[0, 1]`.
@@ -107,7 +127,7 @@ impl<'a> PointSampler<'a> {
     #[must_use]
     pub fn pmf(&self, triangle: TriangleId) -> f32 {
         let leaf = self.at.scene.lights.leaf(triangle);
-        leaf.map_or(0.0, |leaf| self.mixture.one().pmf(&self.at, leaf) as f32)
+        leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] goes in a direction: the sum over all points of all
@@ -115,7 +135,8 @@ impl<'a> PointSampler<'a> {
     /// it is a light. `direction` need not have unit length.
     #[must_use]
     pub fn pdf_direction(&self, direction: Vec3) -> f32 {
-        let mixed = self.mixture.one();
+        let mixture = self.mixture();
+        let mixed = mixture.one();
         let triangles = self.direction_density(direction, None, &mixed);
         to_finite(triangles + self.environment_density(direction, &mixed))
     }
@@ -128,7 +149,8 @@ impl<'a> PointSampler<'a> {
     /// the result is `sample.pdf`.
     #[must_use]
     pub fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
-        let mixed = self.mixture.one();
+        let mixture = self.mixture();
+        let mixed = mixture.one();
         let (own, environment) = match sample.light {
             SampledLight::Triangle(hit) => {
                 (self.at.scene.lights.leaf(hit.triangle), self.environment_density(sample.direction, &mixed))
@@ -154,7 +176,8 @@ impl<'a> PointSampler<'a> {
             let key = 4 * u64::from(draw) + i as u64;
             Variate::scrambled(u[i], key, salt ^ key)
         };
-        let mixed = &self.mixture.side_by_side(splitting);
+        let mixture = self.mixture();
+        let mixed = &mixture.side_by_side(splitting);
         let mut visits = 0;
         self.at.scene.tlas.sample_split(
             &self.at,
@@ -180,21 +203,22 @@ impl<'a> PointSampler<'a> {
     /// multiple importance sampling.
     #[must_use]
     pub fn pdf_split(&self, hit: &Hit, splitting: &Splitting) -> f32 {
-        self.pdf_of_hit(hit, &self.mixture.side_by_side(splitting))
+        self.pdf_of_hit(hit, &self.mixture().side_by_side(splitting))
     }
 
     /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a direction of the environment,
     /// where that is a light.
     #[must_use]
     pub fn pdf_split_environment(&self, direction: Vec3, splitting: &Splitting) -> f32 {
-        to_finite(self.environment_density(direction, &self.mixture.side_by_side(splitting)))
+        to_finite(self.environment_density(direction, &self.mixture().side_by_side(splitting)))
     }
 
     /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] in a direction: the sum over
     /// all points that the ray crosses, and the environment if it is a light.
     #[must_use]
     pub fn pdf_split_direction(&self, direction: Vec3, splitting: &Splitting) -> f32 {
-        let mixed = self.mixture.side_by_side(splitting);
+        let mixture = self.mixture();
+        let mixed = mixture.side_by_side(splitting);
         let triangles = self.direction_density(direction, None, &mixed);
         to_finite(triangles + self.environment_density(direction, &mixed))
     }

@@ -46,6 +46,8 @@ pub(crate) struct Mixture {
     /// The environment, if it is a light and anything can arrive from it.
     sky: Option<Sky>,
     shares: Shares,
+    /// Whether all of this is known, and not only that there are trees.
+    is_complete: bool,
 }
 
 /// What each unit of a technique's [`total`](Technique::total) counts.
@@ -79,9 +81,11 @@ impl Drawn {
 }
 
 impl Mixture {
-    /// Finds out what there is besides the trees.
-    #[inline(always)]
+    /// Finds out what there is besides the trees, the first time it is called.
     pub(crate) fn look_beside(&mut self, at: &Viewpoint<'_>) {
+        if core::mem::replace(&mut self.is_complete, true) {
+            return;
+        }
         if at.scene.has_features() {
             self.add_features(at);
         }
@@ -94,7 +98,7 @@ impl Mixture {
     #[inline(always)]
     pub(crate) fn of_trees() -> Self {
         let shares = Shares { trees: 1.0, features: 0.0, sky: 0.0 };
-        Self { first: None, features: None, rest: 1.0, sky: None, shares }
+        Self { first: None, features: None, rest: 1.0, sky: None, shares, is_complete: false }
     }
 
     /// Looks for features, and balances them with the trees. In place: the list of features is large, and most of it is

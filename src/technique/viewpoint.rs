@@ -29,6 +29,12 @@ impl<'a> LightScene<'a> {
         self.lights.has_portals && !self.environment.feature_nodes().is_empty()
     }
 
+    /// Whether there may be a technique besides the trees.
+    #[inline]
+    pub(crate) fn has_more_than_trees(&self) -> bool {
+        self.sky.is_some() || self.has_features()
+    }
+
     /// The environment, if what portals show depends on the direction.
     #[inline]
     pub(crate) fn directional_environment(&self) -> Option<&EnvironmentView<'a>> {

@@ -41,7 +41,7 @@ pub(crate) fn sample_split(at: &PointSampler<'_>, u: [f32; 3], splitting: &Split
 }
 
 /// The calls at one shading point: those of the crate, or of a twin that is wrong on purpose.
-pub(crate) trait Point: Sync {
+pub(crate) trait Point {
     fn sample(&self, u: [f32; 3]) -> Option<LightSample>;
     fn pdf(&self, hit: &Hit) -> f32;
     fn pmf(&self, triangle: TriangleId) -> f32;

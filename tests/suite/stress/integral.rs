@@ -1,6 +1,6 @@
 //! Integrals of the density over all triangles.
 
-use fanlight::{Hit, LightSample, ShadingPoint};
+use fanlight::{Hit, LightSample, LightSampler, ShadingPoint};
 
 use super::rows::Row;
 use crate::common::density::{OnTriangle, id, probes};
@@ -63,10 +63,19 @@ pub(crate) fn all(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSamp
 }
 
 /// The sum of all triangles' probabilities, times what the integral over some that were drawn is of theirs.
-pub(crate) fn some(row: &Row, at: &dyn Point, x: &ShadingPoint, kept: &[LightSample], cells: usize) -> (f64, f64) {
+pub(crate) fn some(
+    (row, lights): (&Row, &LightSampler),
+    at: &dyn Point,
+    x: &ShadingPoint,
+    kept: &[LightSample],
+    cells: usize,
+) -> (f64, f64) {
     let triangles: Vec<_> = row.scene.triangles().collect();
     let chunks: Vec<_> = triangles.chunks(CHUNK).collect();
-    let sum = |chunk: &[(usize, usize)]| chunk.iter().map(|&t| f64::from(at.pmf(id(t)))).sum::<f64>();
+    let sum = |chunk: &[(usize, usize)]| {
+        let at = lights.at(x);
+        chunk.iter().map(|&t| f64::from(at.pmf(id(t)))).sum::<f64>()
+    };
     let total: f64 = parallel::map(chunks.len(), |i| sum(chunks[i])).iter().sum();
     let some: Vec<_> = kept.iter().take(SOME).map(|sample| sample.hit().expect("a triangle").triangle).collect();
     let (mut ratio, mut variance) = (0.0, 0.0);

@@ -68,11 +68,11 @@ fn run(number: usize, plan: &Plan) -> (&'static str, Vec<Cell>) {
             let x = columns::point(&row.scene, column, receiver);
             let at = lights.at(&x);
             let seed = (number * cells.len() + column) as u64;
-            let mut found = measure(&row, &at, &x, effort, seed);
+            let mut found = measure((&row, &lights), &at, &x, effort, seed);
             if !found.misses().is_empty() {
                 // More samples and cells tell an error from chance.
                 let more = Effort { points: AGAIN * effort.points, cells: AGAIN * effort.cells, ..effort };
-                found = measure(&row, &at, &x, more, 1000 + seed);
+                found = measure((&row, &lights), &at, &x, more, 1000 + seed);
                 repeated += 1;
             }
             let context = format!("{} {:?} {variant}", describe(&row, column, &x), ARITIES[variant / 2]);
@@ -251,7 +251,7 @@ fn a_wrong_density_misses_all_bars() {
     let lights = build(&row.scene, ARITIES[0]);
     let x = columns::point(&row.scene, columns::NAMES.len() - 1, 2);
     let effort = Effort { points: 1024, samples: 300, directions: 100, cells: 300 };
-    assert!(measure(&row, &lights.at(&x), &x, effort, 1).misses().is_empty());
-    let found = measure(&row, &Wrong(lights.at(&x)), &x, effort, 1);
+    assert!(measure((&row, &lights), &lights.at(&x), &x, effort, 1).misses().is_empty());
+    let found = measure((&row, &lights), &Wrong(lights.at(&x)), &x, effort, 1);
     assert_eq!(found.misses(), ["normalisation", "agreement", "irradiance"], "{found:?}");
 }

@@ -1,6 +1,6 @@
 //! What one scene does at one shading point.
 
-use fanlight::{Hit, LightSample, ShadingPoint};
+use fanlight::{Hit, LightSample, LightSampler, ShadingPoint};
 use glam::DVec3;
 
 use super::columns;
@@ -61,7 +61,13 @@ pub(crate) struct Found {
 }
 
 /// Everything about one cell. A sample that is no number is a panic.
-pub(crate) fn measure(row: &Row, at: &dyn Point, x: &ShadingPoint, effort: Effort, seed: u64) -> Found {
+pub(crate) fn measure(
+    (row, lights): (&Row, &LightSampler),
+    at: &dyn Point,
+    x: &ShadingPoint,
+    effort: Effort,
+    seed: u64,
+) -> Found {
     let mut pcg = Pcg32::new(seed, 62);
     let mut found = Found::default();
     let kept = agreement(row, at, x, effort, &mut pcg, &mut found);
@@ -84,7 +90,7 @@ pub(crate) fn measure(row: &Row, at: &dyn Point, x: &ShadingPoint, effort: Effor
     }
     found.dark = exact.arriving == 0.0 && found.none == 1.0;
     let (integral, error) = if is_many(row) {
-        integral::some(row, at, x, &kept, effort.cells)
+        integral::some((row, lights), at, x, &kept, effort.cells)
     } else {
         integral::all(row, at, x, &kept, effort.cells)
     };
