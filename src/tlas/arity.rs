@@ -3,7 +3,8 @@
 /// Number of children of a node of the tree over triangles.
 ///
 /// The wider a node, the more children compete in one choice, so that choices are better and walks are shorter; but
-/// all lanes are computed, whether they are used or not. Without AVX, [`Arity::Eight`] may be faster than the default.
+/// all lanes are computed, whether they are used or not. Without AVX, [`Arity::Eight`] may be faster than the default. Where
+/// a narrower node holds all lights of a scene, the tree gets the least arity that does.
 /// The arity is a property of the built sampler and is kept in its bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -25,6 +26,12 @@ impl Arity {
     /// Returns the number of children that a node has room for.
     pub const fn lanes(self) -> usize {
         self as usize
+    }
+
+    /// Returns the least arity whose root has room for this many leaves, if one below this does, and otherwise this.
+    pub(super) fn narrowed_to(self, leaves: usize) -> Self {
+        let has_room = |arity: &Self| (leaves..=self.lanes()).contains(&arity.lanes());
+        [Self::Four, Self::Eight].into_iter().find(has_room).unwrap_or(self)
     }
 
     /// Returns the number that stands for the arity in bytes.

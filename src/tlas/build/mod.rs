@@ -25,8 +25,9 @@ use crate::progress::{Cancelled, Progress};
 use crate::tlas::arity::Arity;
 use crate::tlas::tree::Tlas;
 
-/// Arranges `count` lights, of which `light` tells the bounds, in a tree. Returns it with the lights in the order of its
-/// leaves; its nodes know no bounds until [`Tlas::fit`]. Every light that has found its place is a unit of progress.
+/// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds them all in
+/// one node. Returns it with the lights in the order of its leaves; its nodes know no bounds until [`Tlas::fit`]. Every light
+/// that has found its place is a unit of progress.
 pub(crate) fn build(
     arity: Arity,
     count: usize,
@@ -36,6 +37,7 @@ pub(crate) fn build(
     if count == 0 {
         return Ok((Tlas::empty(arity), Vec::new()));
     }
+    let arity = arity.narrowed_to(count);
     let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
     let mut binary = vec![BinaryNode::default(); 2 * count - 1];
     let classes = divide(&mut items, arity);
