@@ -6,6 +6,7 @@ use fanlight::{
     Environment, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, ShadingPoint, Splitting, Texture,
     TriangleId, Weight,
 };
+use glam::Vec3;
 use smallvec::SmallVec;
 
 use crate::scenes::pcg::Pcg32;
@@ -62,6 +63,7 @@ pub(crate) const ALL: &[Case] = &[
         run: || of_samples("quad", |lights, x, s| lights.at(x).pdf(&s.hit().expect("a triangle"))),
     },
     Case { name: "quad/nee", calls: CALLS, run: || next_event("quad") },
+    Case { name: "cornell/nee", calls: CALLS, run: cornell },
     Case { name: "window/sample", calls: CALLS, run: || sample("window") },
     Case {
         name: "window/pdf",
@@ -85,11 +87,7 @@ pub(crate) const ALL: &[Case] = &[
         calls: CALLS,
         run: || environment(|sky, u| sky.sample([u[0], u[1]]).map_or(0.0, |sample| sample.radiance)),
     },
-    Case {
-        name: "environment/pdf",
-        calls: CALLS,
-        run: || environment(|sky, u| sky.pdf(glam::Vec3::from(u).normalize())),
-    },
+    Case { name: "environment/pdf", calls: CALLS, run: || environment(|sky, u| sky.pdf(Vec3::from(u).normalize())) },
     Case {
         name: "environment-light/at",
         calls: CALLS,
@@ -103,7 +101,7 @@ pub(crate) const ALL: &[Case] = &[
     Case {
         name: "environment-light/pdf",
         calls: CALLS,
-        run: || environment_light(|lights, x, u| lights.at(x).pdf_environment(glam::Vec3::from(u) - 0.5)),
+        run: || environment_light(|lights, x, u| lights.at(x).pdf_environment(Vec3::from(u) - 0.5)),
     },
 ];
 
@@ -206,6 +204,34 @@ fn next_event(workload: &str) {
         let here = lights.at(&points[i]);
         if let Some(sample) = here.sample(numbers[i]) {
             black_box(here.pdf_sample_direction(&sample));
+            black_box(sample);
+        }
+    });
+}
+
+/// What a host does on the floor and the walls of the Cornell box, whose light is two triangles without a texture.
+fn cornell() {
+    let light = [[0.35, 0.35], [0.65, 0.35], [0.65, 0.65], [0.35, 0.65]].map(|[x, y]| Vec3::new(x, y, 0.999));
+    let mut builder = LightSampler::builder();
+    let mesh = Mesh::emitter(&light, &[[0, 2, 1], [0, 3, 2]]).weight(Weight::Constant(15.0));
+    builder.add_mesh(&mesh).expect("the light is sound");
+    let lights = builder.build().expect("the scene is small");
+    let mut pcg = Pcg32::new(5, 5);
+    let points: Vec<ShadingPoint> = (0..CALLS)
+        .map(|i| {
+            let [u, v, _] = pcg.uniform3();
+            match i % 3 {
+                0 => ShadingPoint::surface(Vec3::new(u, v, 0.0), Vec3::Z),
+                1 => ShadingPoint::surface(Vec3::new(0.0, u, v), Vec3::X),
+                _ => ShadingPoint::surface(Vec3::new(u, 1.0, v), Vec3::NEG_Y),
+            }
+        })
+        .collect();
+    let numbers = numbers();
+    measured(|i| {
+        let here = lights.at(&points[i]);
+        if let Some(sample) = here.sample(numbers[i]) {
+            black_box(sample.pdf);
             black_box(sample);
         }
     });

@@ -260,13 +260,6 @@ impl TriangleView<'_> {
         if self.receiver.has_horizon() { self.horizon } else { f32::NEG_INFINITY }
     }
 
-    /// Whether points uniform by area are as good as any.
-    #[inline]
-    pub(super) fn is_about_constant(&self) -> bool {
-        let kernel = CellKernel::new(self);
-        kernel.is_final(LatticeCell::whole(), &mut kernel.whole(), Some(0))
-    }
-
     /// Estimates the irradiance over π from a cell, as if it had a radiance of one. Zero only below the horizon.
     pub(super) fn estimate(&self, at: LatticeCell) -> f32 {
         let vertices = at.corners().map(|corner| {

@@ -10,6 +10,7 @@ mod crossing;
 mod emitted;
 mod energy;
 mod illumination;
+mod linear_density;
 mod mesh;
 mod meshes;
 mod spherical_grid;

@@ -5,6 +5,7 @@ use core::f32::consts::PI;
 use glam::{DVec3, Vec3};
 
 use super::cell_kernel::CellDescent;
+use super::linear_density::LinearDensity;
 use super::spherical_grid::{GridCell, SphericalGrid};
 use super::{DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind};
 use crate::blas::{CellNode, Draw, Follow, Guide, LEAF, Lattice, LatticeCell, Root};
@@ -14,6 +15,7 @@ use crate::math;
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::simd::{InstructionSet, Kernel};
 use crate::warp::Variate;
+use crate::warp::equal_area::sphere_to_square_quickly;
 
 /// Largest coordinate of a shading point that anything arrives at.
 ///
@@ -148,12 +150,21 @@ impl<'a> TriangleView<'a> {
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
 
-    /// Whether points are drawn by direction rather than by area, where the solid angle allows it: without a texture, unless
-    /// points uniform by area are as good.
+    /// Whether points are drawn by a linear density or by direction, where the solid angle allows it: without a texture.
     #[inline]
-    pub(super) fn prefers_directions(&self) -> bool {
-        let is_plain = self.root.node == LEAF && self.illumination == Illumination::ClampedVertices;
-        is_plain && !self.is_about_constant()
+    fn is_plain(&self) -> bool {
+        self.root.node == LEAF && self.illumination == Illumination::ClampedVertices
+    }
+
+    /// Whether what is seen through a portal is about constant over it.
+    #[inline]
+    pub(super) fn has_constant_radiance(&self, center: Vec3, distance2: f32) -> bool {
+        self.environment.is_none_or(|environment| {
+            let inverse = 1.0 / math::sqrt(distance2);
+            let solid_angle = self.area * self.height * (inverse * inverse * inverse);
+            let direction = environment.local_direction(center * inverse);
+            environment.is_about_constant(sphere_to_square_quickly(direction.to_array()), solid_angle)
+        })
     }
 
     /// Whether a point is below the horizon, and not only by rounding to the lattice.
@@ -175,7 +186,10 @@ impl<'a> TriangleView<'a> {
 impl LightViewKind for TriangleView<'_> {
     #[inline(always)]
     fn sample(&self, u: [Variate; 2]) -> Option<DrawnPoint> {
-        if self.prefers_directions() {
+        if self.is_plain() {
+            if let Some(density) = LinearDensity::new(self) {
+                return density.sample(self, u);
+            }
             if let Some(drawn) = InstructionSet::best().run(SampleDirection { view: self, u }) {
                 return drawn;
             }
@@ -188,7 +202,10 @@ impl LightViewKind for TriangleView<'_> {
 
     #[inline]
     fn pdf(&self, point: Lattice) -> Option<f64> {
-        if self.prefers_directions() {
+        if self.is_plain() {
+            if let Some(density) = LinearDensity::new(self) {
+                return density.pdf(self, point);
+            }
             if let Some(pdf) = InstructionSet::best().run(PdfOfDirection { view: self, point }) {
                 return pdf;
             }

@@ -125,6 +125,12 @@ pub(crate) struct HeightWeights {
 }
 
 impl HeightWeights {
+    /// Returns the weight of a point at this height and distance, times the distance.
+    #[inline(always)]
+    pub(crate) fn at(self, height: f32, distance: f32) -> f32 {
+        at_least(height, self.below * height) + self.distance * distance
+    }
+
     /// Returns the mean weight of a cell times its distance, by the heights of its corners.
     #[inline(always)]
     pub(crate) fn mean(self, [a, b, c]: [f32; 3], distance: f32) -> f32 {

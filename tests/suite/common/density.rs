@@ -1,6 +1,6 @@
 //! Integrals of a density over triangles, from the outside: nothing is known but values of `pdf` at points, and that
 //! either the density per area is constant over dyadic barycentric cells of a depth that is not known, or that per
-//! solid angle over cells of any shape.
+//! solid angle over cells of any shape, or that per area linear over the triangle, but for what is added in places.
 
 use fanlight::{Hit, LightSample, MeshId, ShadingPoint, TriangleId};
 use glam::DVec3;
@@ -29,6 +29,9 @@ const DEEPEST_DOUBT: u32 = 8;
 /// Cells with more probability are divided, however equal the density looks: what little they hide would count.
 const HEAVY: f64 = 2e-5;
 
+/// Of 16 points, how many must lie on a linear function.
+const MOST: usize = 12;
+
 mod walk;
 
 use walk::{Cell, Open, Walk};
@@ -40,12 +43,19 @@ struct Density {
     pdf: f64,
     /// From solid angle to the unit of the triangle.
     scale: f64,
+    /// What a density that is linear over the triangle has here above its mean.
+    slope: f64,
 }
 
 impl Density {
     /// In units of one over the triangle's area.
     fn by_area(self) -> f64 {
         self.pdf * self.scale
+    }
+
+    /// The same without the slope of the triangle's density.
+    fn level(self) -> f64 {
+        self.by_area() - self.slope
     }
 }
 
@@ -56,6 +66,8 @@ pub(crate) struct OnTriangle<'a> {
     /// Times the triangle's area, over the distance cubed: from solid angle to the unit of the triangle.
     height_area: f64,
     is_by_angle: bool,
+    /// What a density that is linear over the triangle has above its mean in the three corners.
+    slope: [f64; 3],
     /// Factor on [`HEAVY`] and [`NEGLIGIBLE_DOUBT`].
     coarser: f64,
     deepest: u32,
@@ -77,13 +89,15 @@ impl<'a> OnTriangle<'a> {
             vertices,
             height_area,
             is_by_angle: false,
+            slope: [0.0; 3],
             coarser: 1.0,
             deepest,
             most,
             enough,
             pdf,
         };
-        Self { is_by_angle: on.is_constant_by_angle(), ..on }
+        let slope = on.find_slope().unwrap_or_default();
+        Self { is_by_angle: on.is_constant_by_angle(), slope, ..on }
     }
 
     /// Divides cells so often if need be, but not more than so many of them, and none where all that is in doubt is
@@ -114,6 +128,30 @@ impl<'a> OnTriangle<'a> {
         votes > 0
     }
 
+    /// The slope of the linear function that the density per area follows in most of the triangle, if there is one.
+    fn find_slope(&self) -> Option<[f64; 3]> {
+        let mut pcg = Pcg32::new(self.id.triangle.into(), 64);
+        let mut point = || {
+            let [u, v] = [pcg.f32(), pcg.f32()].map(|u| 0.001 + 0.998 * f64::from(u));
+            if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] }
+        };
+        let known: Vec<([f64; 2], f64)> =
+            [(); 16].iter().map(|()| point()).map(|b| (b, self.density(b).by_area())).collect();
+        known.windows(3).find_map(|window| {
+            let [(p, f), (q, g), (r, h)] = [window[0], window[1], window[2]];
+            let (e, d) = ([q[0] - p[0], q[1] - p[1]], [r[0] - p[0], r[1] - p[1]]);
+            let determinant = e[0] * d[1] - e[1] * d[0];
+            let slopes =
+                [((g - f) * d[1] - (h - f) * e[1]) / determinant, ((h - f) * e[0] - (g - f) * d[0]) / determinant];
+            let at = |b: [f64; 2]| f + slopes[0] * (b[0] - p[0]) + slopes[1] * (b[1] - p[1]);
+            let fits = known.iter().filter(|(b, value)| *value > 0.0 && (at(*b) - value).abs() <= 2e-5 * value).count();
+            let is_level = slopes.iter().all(|slope| slope.abs() <= 1e-3 * f);
+            let mean = at([1.0 / 3.0, 1.0 / 3.0]);
+            (determinant.abs() > 0.05 && fits >= MOST && !is_level)
+                .then(|| [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|corner| at(corner) - mean))
+        })
+    }
+
     /// The density at a point.
     fn density(&self, b: [f64; 2]) -> Density {
         // Next to the shading point, rounding would be felt.
@@ -123,7 +161,9 @@ impl<'a> OnTriangle<'a> {
         let distance = (v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2).length();
         let scale = self.height_area / distance.powi(3);
         let pdf = (self.pdf)(&Hit::new(self.id, barycentrics));
-        if distance > 0.0 { Density { pdf, scale } } else { Density::default() }
+        let [s0, s1, s2] = self.slope;
+        let slope = s0 * (1.0 - b1 - b2) + s1 * b1 + s2 * b2;
+        if distance > 0.0 { Density { pdf, scale, slope } } else { Density::default() }
     }
 
     /// Solid angle of a barycentric triangle with this share of the area.

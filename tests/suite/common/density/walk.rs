@@ -137,7 +137,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         if !self.on.is_limited() && cell.depth < self.on.deepest && cell.share() * densest > self.on.coarser * HEAVY {
             return self.divide(cell);
         }
-        let are_equal = range(values.iter().map(|v| v.pdf)) == 0.0 || range(values.iter().map(|v| v.by_area())) == 0.0;
+        let are_equal = range(values.iter().map(|v| v.pdf)) == 0.0 || range(values.iter().map(|v| v.level())) == 0.0;
         // Averages are rounded, so that four can be the same by chance: then their quarters must be, too.
         let mut parts = Vec::new();
         if cell.depth < DEEPEST_DOUBT && are_equal {
@@ -151,7 +151,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         let all = || values.iter().chain(&parts).copied().chain(cell.probes.iter().map(|p| p.1));
         let share = cell.share();
         let range = Range {
-            by_area: range(all().map(Density::by_area)),
+            by_area: range(all().map(Density::level)),
             by_angle: range(all().map(|v| v.pdf)),
             solid_angle: self.on.solid_angle(cell.corners, share),
         };
