@@ -85,17 +85,58 @@ impl VisibleFeatures {
         }
     }
 
-    /// Draws a point on a portal towards one entry of the list.
-    fn point(&self, at: &Viewpoint<'_>, index: usize, u: [Variate; 2]) -> Option<LightPoint> {
+    /// Draws a point on a portal towards one entry of the list. Returns it with the entry's density over the excess of
+    /// the feature, if that is known then.
+    fn point(&self, at: &Viewpoint<'_>, index: usize, u: [Variate; 2]) -> Option<(LightPoint, Option<f64>)> {
         let VisibleFeature { leaf, node, part } = self.get(index);
         let node = node as usize;
         if leaf == ANY_PORTAL {
-            return least_crossed(at, at.scene.environment.sample_feature(node, u));
+            return least_crossed(at, at.scene.environment.sample_feature(node, u)).map(|point| (point, None));
         }
         let view = &at.view(leaf);
         let triangle = view.as_ref()?.as_portal()?;
-        let point = FeatureView::new(triangle, &at.scene.environment, node).sample(part, u)?;
-        Some(LightPoint { leaf, point })
+        let (point, per_excess) = FeatureView::new(triangle, &at.scene.environment, node).sample(part, u)?;
+        Some((LightPoint { leaf, point }, Some(per_excess)))
+    }
+
+    /// Returns the density of a point. `known` is an entry of the list that draws the point, with its density over the excess
+    /// of the feature.
+    #[inline]
+    fn density_with(
+        &self,
+        at: &Viewpoint<'_>,
+        point: LightPoint,
+        view: &LightView<'_>,
+        known: Option<(usize, f64)>,
+    ) -> Density {
+        let none = Density { pmf: 0.0, pdf: 0.0 };
+        let Some(triangle) = view.as_portal() else { return none };
+        let direction = triangle.point(point.point).normalize_or_zero().as_vec3();
+        let environment = &at.scene.environment;
+        let Some((block, excess)) = environment.feature_at(direction) else { return none };
+        let mut pdf = 0.0;
+        for (index, (visible, weight)) in self.entries().enumerate() {
+            let LightPoint { leaf, point } = point;
+            let node = visible.node as usize;
+            let is_here = visible.leaf == leaf || visible.leaf == ANY_PORTAL;
+            if !is_here || !environment.feature_nodes()[node].holds_block(block) {
+                continue;
+            }
+            let per_excess = if visible.leaf == ANY_PORTAL {
+                // On an edge, rounding may take the ray past the very light that the point lies on, or to its neighbor.
+                let is_least = at.scene.lights.is_crossed_once
+                    || least_crossed(at, direction).is_none_or(|least| least.leaf >= leaf);
+                if is_least { 1.0 / f64::from(environment.feature_nodes()[node].power) } else { 0.0 }
+            } else if !visible.part.cell.holds(point) {
+                continue;
+            } else if let Some((_, per_excess)) = known.filter(|(drawn, _)| *drawn == index) {
+                per_excess
+            } else {
+                FeatureView::new(triangle, environment, node).pdf_per_excess(visible.part, point)
+            };
+            pdf += f64::from(weight) * f64::from(excess) * per_excess;
+        }
+        Density { pmf: 0.0, pdf }
     }
 }
 
@@ -111,40 +152,16 @@ impl Technique for VisibleFeatures {
         then: impl FnOnce(PlacedPoint, Density, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
         let index = pick(self.weights(), self.total(), &mut u.choice);
-        let point = self.point(at, index, u.point)?;
+        let (point, per_excess) = self.point(at, index, u.point)?;
         let view = at.view(point.leaf)?;
         let relative = view.point(point.point);
-        then(PlacedPoint { point, relative }, self.density(at, point, &view), &view)
+        let density = self.density_with(at, point, &view, per_excess.map(|per_excess| (index, per_excess)));
+        then(PlacedPoint { point, relative }, density, &view)
     }
 
     #[inline]
     fn density(&self, at: &Viewpoint<'_>, point: LightPoint, view: &LightView<'_>) -> Density {
-        let none = Density { pmf: 0.0, pdf: 0.0 };
-        let Some(triangle) = view.as_portal() else { return none };
-        let direction = triangle.point(point.point).normalize_or_zero().as_vec3();
-        let environment = &at.scene.environment;
-        let Some((block, excess)) = environment.feature_at(direction) else { return none };
-        let mut pdf = 0.0;
-        for (visible, weight) in self.entries() {
-            let LightPoint { leaf, point } = point;
-            let node = visible.node as usize;
-            let is_here = visible.leaf == leaf || visible.leaf == ANY_PORTAL;
-            if !is_here || !environment.feature_nodes()[node].holds_block(block) {
-                continue;
-            }
-            let per_excess = if visible.leaf == ANY_PORTAL {
-                // On an edge, rounding may take the ray past the very light that the point lies on, or to its neighbor.
-                let is_least = at.scene.lights.is_crossed_once
-                    || least_crossed(at, direction).is_none_or(|least| least.leaf >= leaf);
-                if is_least { 1.0 / f64::from(environment.feature_nodes()[node].power) } else { 0.0 }
-            } else if visible.part.cell.holds(point) {
-                FeatureView::new(triangle, environment, node).pdf_per_excess(visible.part, point)
-            } else {
-                continue;
-            };
-            pdf += f64::from(weight) * f64::from(excess) * per_excess;
-        }
-        Density { pmf: 0.0, pdf }
+        self.density_with(at, point, view, None)
     }
 }
 

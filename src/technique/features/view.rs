@@ -138,22 +138,27 @@ impl<'a> FeatureView<'a> {
         if all > 0.0 { sum / all } else { 0.0 }
     }
 
-    /// Draws a point in a part.
-    pub(super) fn sample(&self, part: FeaturePart, u: [Variate; 2]) -> Option<Lattice> {
+    /// Draws a point in a part. Returns it with its [`pdf_per_excess`](Self::pdf_per_excess).
+    pub(super) fn sample(&self, part: FeaturePart, u: [Variate; 2]) -> Option<(Lattice, f64)> {
         if part.node == LEAF {
-            return self.sample_in(part.cell, Some(part.power), u);
+            let (point, power) = self.sample_in(part.cell, Some(part.power), u)?;
+            return Some((point, 1.0 / f64::from(power)));
         }
         let mut draw = Draw::new(u);
-        let (cell, _) = blas::descend_below(self.triangle.cells, part.node, part.cell, (), self, &mut draw)?;
-        self.sample_in(cell, None, draw.rest())
+        let (cell, pmf) = blas::descend_below(self.triangle.cells, part.node, part.cell, (), self, &mut draw)?;
+        let (point, power) = self.sample_in(cell, None, draw.rest())?;
+        // As the point lies strictly inside of the cell, its density is found in the same cell.
+        Some((point, pmf / f64::from(power)))
     }
 
-    /// Draws a point in a cell of one opacity. `power` is the feature's through the cell, if it is known already.
-    fn sample_in(&self, cell: LatticeCell, power: Option<f32>, u: [Variate; 2]) -> Option<Lattice> {
+    /// Draws a point in a cell of one opacity. `power` is the feature's through the cell, if it is known already. Returns it
+    /// with the point, which lies strictly inside of the cell.
+    fn sample_in(&self, cell: LatticeCell, power: Option<f32>, u: [Variate; 2]) -> Option<(Lattice, f32)> {
         let opening = self.opening(cell);
         let power = power.unwrap_or_else(|| opening.power(self.environment, self.node));
         let direction = opening.sample(self.environment, self.node, power, u);
-        self.triangle.intersect(direction).filter(|point| cell.holds(*point))
+        let point = self.triangle.intersect(direction).filter(|point| cell.holds(*point))?;
+        (power > 0.0).then_some((point, power))
     }
 
     /// Density per solid angle with which [`Self::sample`] draws a point of the part, divided by the feature's excess
