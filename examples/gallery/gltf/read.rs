@@ -107,7 +107,7 @@ impl Reader {
             }
         };
         let material = primitive.material().index().unwrap_or(self.model.materials.len() - 1);
-        self.model.add(Mesh { positions, uvs, indices, material });
+        self.model.add(Mesh { positions, uvs, indices, material, ..Mesh::default() });
         Ok(())
     }
 
