@@ -13,6 +13,11 @@ const GROUP: usize = 16;
 /// Most bytes and most elements of a block. *Format.*
 const BLOCK_BYTES: usize = 8192;
 const BLOCK_ELEMENTS: usize = 256;
+/// Least bytes after the blocks, by version. *Format.*
+const TAIL: [usize; 2] = [32, 24];
+/// Bytes after triangles and after indices. *Format.*
+const TABLE: usize = 16;
+const PADDING: usize = 4;
 /// Largest element in bytes. *Format.*
 const LARGEST: usize = 256;
 
@@ -51,6 +56,11 @@ impl<'a> Cursor<'a> {
 
     fn byte(&mut self) -> Result<u8, Error> {
         Ok(self.take(1)?[0])
+    }
+
+    /// Refuses data that is longer or shorter than so many bytes before its end.
+    fn ends_before(&self, rest: usize) -> Result<(), Error> {
+        if self.at + rest == self.bytes.len() { Ok(()) } else { Err("its data is of another length".into()) }
     }
 
     /// A number in groups of seven bits.
@@ -103,7 +113,8 @@ fn attributes(source: &[u8], count: usize, stride: usize) -> Result<Vec<u8>, Err
         }
         left -= size;
     }
-    Ok(elements)
+    let padded = tail.len().max(if packed_by_channels { TAIL[1] } else { TAIL[0] });
+    cursor.ends_before(padded).map(|()| elements)
 }
 
 /// Differences of a block, in rows of one byte of all elements.
@@ -279,7 +290,7 @@ fn triangles(source: &[u8], count: usize) -> Result<Vec<u32>, Error> {
         return Err("it holds no triangles".into());
     }
     let codes = part(source, 1, count / 3).ok_or("its data ends too early")?;
-    let pairs = source.len().checked_sub(16).map(|start| &source[start..]).ok_or("its data ends too early")?;
+    let pairs = source.len().checked_sub(TABLE).map(|start| &source[start..]).ok_or("its data ends too early")?;
     let data = Cursor { bytes: source, at: 1 + count / 3 };
     let mut vertices = Vertices { next: 0, last: 0, recent: Recent::new(), data };
     let mut edges = Recent::<[u32; 2], 16>::new();
@@ -301,7 +312,7 @@ fn triangles(source: &[u8], count: usize) -> Result<Vec<u32>, Error> {
         };
         indices.extend([a, b, c]);
     }
-    Ok(indices)
+    vertices.data.ends_before(TABLE).map(|()| indices)
 }
 
 fn sequence(source: &[u8], count: usize) -> Result<Vec<u32>, Error> {
@@ -320,7 +331,8 @@ fn sequence(source: &[u8], count: usize) -> Result<Vec<u32>, Error> {
         *last = last.wrapping_add(unzigzag(code >> 1));
         Ok(*last)
     };
-    (0..count).map(|_| next()).collect()
+    let indices = (0..count).map(|_| next()).collect::<Result<_, Error>>()?;
+    data.ends_before(PADDING).map(|()| indices)
 }
 
 /// Indices of two or four bytes.

@@ -23,6 +23,8 @@ mod primitive;
 mod read;
 mod skin;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod texture;
 mod triangles;
 mod write;

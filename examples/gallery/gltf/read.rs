@@ -108,6 +108,9 @@ impl Reader<'_> {
         let weights = if node.weights.is_empty() { &mesh.weights } else { &node.weights };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let within = |error: Error| Error::from(format!("{called}, primitive {number}: {error}"));
+            if let Some(material) = primitive.material {
+                member(&self.document.materials, "material", material).map_err(within)?;
+            }
             let material = primitive.material.unwrap_or(self.document.materials.len());
             let ([color, emission], of_model) = self.material(material)?;
             let joints = joints.as_deref();
@@ -142,7 +145,8 @@ impl Reader<'_> {
 
     /// Where a material's images are read, and its number in the model. Reads it if this is its first use.
     fn material(&mut self, index: usize) -> Result<(Mappings, usize), Error> {
-        if let (Some(mappings), Some(number)) = (self.mappings.get(index).copied().flatten(), self.uses[index].number) {
+        let known = self.mappings.get(index).copied().flatten();
+        if let (Some(mappings), Some(number)) = (known, self.uses.get(index).and_then(|uses| uses.number)) {
             return Ok((mappings, number));
         }
         let none = self.document.materials.len();
