@@ -12,6 +12,8 @@ use crate::render::{Error, Mesh};
 
 /// Name of the compression that is not read.
 const DRACO: &str = "KHR_draco_mesh_compression";
+/// Cosine between two triangles above which they count as one plane: two degrees. *Chosen* so that rounding is no edge.
+const FLAT: f32 = 0.9994;
 
 /// How a primitive is to be read.
 pub(super) struct Wanted<'a> {
@@ -23,6 +25,8 @@ pub(super) struct Wanted<'a> {
     pub(super) joints: Option<&'a [Mat4]>,
     pub(super) color: Option<Mapping>,
     pub(super) emission: Option<Mapping>,
+    /// Whether its material lets light through where there is no alpha.
+    pub(super) has_alpha: bool,
     /// Number of its material.
     pub(super) material: usize,
 }
@@ -53,6 +57,9 @@ pub(super) fn read(
     if let Some(index) = indices.as_flattened().iter().find(|&&index| index as usize >= positions.len()) {
         return Err(format!("it uses vertex {index}, but has {}", positions.len()).into());
     }
+    if primitive.attributes.contains_key("NORMAL") && is_curved(&positions, &indices) {
+        notes.about(wanted.called, "its normals are ignored: it is as flat as its triangles");
+    }
     morph(data, primitive, wanted, &mut positions, notes)?;
     let is_skinned = match wanted.joints {
         Some(joints) => skin::apply(data, primitive, joints, &mut positions)?,
@@ -68,6 +75,19 @@ pub(super) fn read(
     let colors = colors(data, primitive, wanted, positions.len(), notes)?;
     let mesh = Mesh { positions, uvs, emission_uvs, colors, indices, material: wanted.material };
     Ok(Some((mesh, is_skinned)))
+}
+
+/// Whether triangles that share a vertex face different sides, so that normals smooth the edges between them.
+fn is_curved(positions: &[Vec3], indices: &[[u32; 3]]) -> bool {
+    let mut normals = vec![Vec3::ZERO; positions.len()];
+    indices.iter().any(|corners| {
+        let [a, b, c] = corners.map(|i| positions[i as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        corners.iter().any(|&i| {
+            let known = core::mem::replace(&mut normals[i as usize], normal);
+            known != Vec3::ZERO && normal != Vec3::ZERO && known.dot(normal) < FLAT
+        })
+    })
 }
 
 fn refuse_draco(data: &Data<'_>, primitive: &Primitive, positions: usize) -> Result<(), Error> {
@@ -140,7 +160,7 @@ fn colors(
     let colors: Vec<Vec3> = match data.shape(index)? {
         [_, 4] => {
             let colors = data.floats::<4>(index)?;
-            if colors.iter().any(|color| color[3] < 1.0) {
+            if wanted.has_alpha && colors.iter().any(|color| color[3] < 1.0) {
                 notes.about(wanted.called, "the alpha of its vertices' colors is ignored");
             }
             colors.into_iter().map(|[r, g, b, _]| Vec3::new(r, g, b)).collect()

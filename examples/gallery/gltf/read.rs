@@ -112,9 +112,10 @@ impl Reader<'_> {
                 member(&self.document.materials, "material", material).map_err(within)?;
             }
             let material = primitive.material.unwrap_or(self.document.materials.len());
-            let ([color, emission], of_model) = self.material(material)?;
+            let ([color, emission], of_model) = self.material(material).map_err(within)?;
             let joints = joints.as_deref();
-            let wanted = Wanted { called: &called, weights, joints, color, emission, material: of_model };
+            let has_alpha = self.model.materials[of_model].has_holes();
+            let wanted = Wanted { called: &called, weights, joints, color, emission, has_alpha, material: of_model };
             let local = primitive::read(&self.data, primitive, &wanted, &mut self.notes).map_err(within)?;
             let Some((local, is_skinned)) = local else { continue };
             let places = if is_skinned { &[Mat4::IDENTITY][..] } else { &places };

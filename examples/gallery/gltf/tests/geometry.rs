@@ -67,6 +67,16 @@ fn points_are_noted() {
 }
 
 #[test]
+fn smooth_normals_are_noted() {
+    let mut file = File::lamp();
+    file.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(0);
+    assert!(file.read().notes.is_empty());
+    let bent = file.floats("VEC3", &[-1.0, 0.0, -1.0, 1.0, 0.0, -1.0, 1.0, 0.0, 1.0, -1.0, 0.5, 1.0]);
+    file.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(bent);
+    file.read().assert_note(&["mesh 0", "normals are ignored"]);
+}
+
+#[test]
 fn morph_targets() {
     let mut file = File::lamp();
     let square = [[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]];

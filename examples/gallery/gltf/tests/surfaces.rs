@@ -76,6 +76,16 @@ fn colors_of_vertices() {
 }
 
 #[test]
+fn alpha_of_vertices() {
+    let mut file = File::lamp();
+    let colors = file.floats("VEC4", &[1.0, 1.0, 1.0, 0.5].repeat(4));
+    file.json["meshes"][1]["primitives"][0]["attributes"]["COLOR_0"] = json!(colors);
+    assert!(file.read().notes.is_empty());
+    file.json["materials"][1]["alphaMode"] = json!("BLEND");
+    file.read().assert_note(&["mesh 1", "alpha"]);
+}
+
+#[test]
 fn gray_vertices() {
     let mut file = File::lamp();
     let colors = file.floats("VEC3", &[0.5; 12]);
