@@ -1,12 +1,12 @@
 //! Takes the JSON and the binary part out of a `.gltf` or a `.glb`.
 
-use serde::Deserialize;
-
 use super::document::Document;
 use crate::render::Error;
 
 /// First bytes of a `.glb`. *Format.*
 const MAGIC: &[u8] = b"glTF";
+/// What some programs write before text. *Format.*
+const BYTE_ORDER: &[u8] = b"\xef\xbb\xbf";
 /// Kinds of a `.glb`'s chunks. *Format.*
 const JSON: [u8; 4] = *b"JSON";
 const BIN: [u8; 4] = *b"BIN\0";
@@ -14,11 +14,12 @@ const BIN: [u8; 4] = *b"BIN\0";
 /// Parses a file. Returns what it says, and the buffer that is inside of it.
 pub(super) fn parse(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), Error> {
     let (json, blob) = if bytes.starts_with(MAGIC) { chunks(bytes)? } else { (bytes, None) };
+    let json = json.strip_prefix(BYTE_ORDER).unwrap_or(json);
     let value: serde_json::Value =
         serde_json::from_slice(json).map_err(|error| format!("this is no glTF file: its JSON is broken ({error})"))?;
     check_version(&value)?;
     let document =
-        Document::deserialize(value).map_err(|error| format!("its JSON is not that of glTF 2.0 ({error})"))?;
+        serde_json::from_slice(json).map_err(|error| format!("its JSON is not that of glTF 2.0 ({error})"))?;
     Ok((document, blob))
 }
 

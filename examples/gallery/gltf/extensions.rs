@@ -4,8 +4,8 @@ use super::document::Document;
 use super::notes::Notes;
 use crate::render::Error;
 
-/// Those that the other files of this folder read.
-pub(super) const HONORED: [&str; 18] = [
+/// Those that the other files of this folder look for: to honor them, or to say what cannot be.
+pub(super) const KNOWN: [&str; 18] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_avif",
@@ -61,5 +61,5 @@ pub(super) fn check(document: &Document, notes: &mut Notes) -> Result<(), Error>
 
 fn is_known(name: &str) -> bool {
     // Materials of all kinds are approximated, and what that leaves out is said of each of them.
-    HONORED.contains(&name) || HARMLESS.contains(&name) || name.starts_with("KHR_materials_")
+    KNOWN.contains(&name) || HARMLESS.contains(&name) || name.starts_with("KHR_materials_")
 }

@@ -7,7 +7,7 @@ use image::{ImageFormat, ImageReader};
 use serde::Deserialize;
 
 use super::data::Data;
-use super::document::{Texture, extension, member};
+use super::document::{Texture, called, extension, member};
 use crate::render::Error;
 
 /// Longest side of an image in pixels. Larger ones are not decoded; what decodes 16 bits or less needs no more.
@@ -47,9 +47,10 @@ struct Source {
 impl Images {
     /// The image of a texture: the first one that can be read.
     pub(super) fn of_texture(&mut self, data: &Data<'_>, texture: usize) -> Result<&Picture, Error> {
-        let texture = member(&data.document.textures, "texture", texture)?;
+        let index = texture;
+        let texture = member(&data.document.textures, "texture", index)?;
         let sources = sources(texture)?;
-        let Some(&first) = sources.first() else { return Err(no_image(texture)) };
+        let Some(&first) = sources.first() else { return Err(no_image(index, texture)) };
         let readable = sources.iter().copied().find(|&source| self.get(data, source).is_ok());
         self.get(data, readable.unwrap_or(first)).map_err(|error| Error::from(error.as_str()))
     }
@@ -71,10 +72,8 @@ impl Images {
     }
 }
 
-fn no_image(texture: &Texture) -> Error {
-    let name = texture.name.as_deref().unwrap_or("without a name").escape_debug();
-    let known = texture.extensions.keys().cloned().collect::<Vec<_>>().join(", ");
-    format!("texture `{name}` has no image ({known})").into()
+fn no_image(index: usize, texture: &Texture) -> Error {
+    format!("{} has no image", called("texture", index, texture.name.as_deref())).into()
 }
 
 /// Images of a texture, the better ones first.

@@ -26,7 +26,7 @@ const ANGLE: f32 = 0.014;
 const STRONGEST: f32 = 1e12;
 
 /// A light as the file describes it.
-#[derive(Clone, Deserialize)]
+#[derive(Deserialize)]
 #[serde(default)]
 pub(super) struct Lamp {
     pub(super) name: Option<String>,
@@ -44,7 +44,7 @@ impl Default for Lamp {
     }
 }
 
-#[derive(Clone, Deserialize)]
+#[derive(Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 struct Spot {
     inner_cone_angle: f32,
@@ -58,11 +58,6 @@ impl Default for Spot {
 }
 
 #[derive(Deserialize)]
-struct Lights {
-    lights: Vec<Lamp>,
-}
-
-#[derive(Deserialize)]
 struct Reference {
     light: usize,
 }
@@ -70,8 +65,9 @@ struct Reference {
 /// The light that a node holds, and what messages call it.
 pub(super) fn of_node(document: &Document, node: &Node) -> Result<Option<(Lamp, String)>, Error> {
     let Some(Reference { light }) = extension(&node.extensions, NAME)? else { return Ok(None) };
-    let lights = extension::<Lights>(&document.extensions, NAME)?.map_or(vec![], |lights| lights.lights);
-    let lamp = member(&lights, "light", light)?.clone();
+    let lights = document.extensions.get(NAME).and_then(|extension| extension.get("lights")?.as_array());
+    let lamp = member(lights.map_or(&[][..], Vec::as_slice), "light", light)?;
+    let lamp = Lamp::deserialize(lamp).map_err(|error| format!("light {light} cannot be read ({error})"))?;
     let called = called("light", light, lamp.name.as_deref());
     Ok(Some((lamp, called)))
 }

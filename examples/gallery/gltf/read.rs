@@ -1,5 +1,6 @@
 //! Reads a model from glTF.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use glam::{Mat3, Mat4, Vec3};
@@ -12,7 +13,7 @@ use super::images::Images;
 use super::instances::instances;
 use super::notes::Notes;
 use super::primitive::{self, Wanted};
-use super::surface::{Reading, Surface};
+use super::surface::{Map, Reading, Surface};
 use super::texture::Mapping;
 use super::{container, extensions, lamps, skin};
 use crate::render::{Camera, Error, Material, Mesh, Model, Sky};
@@ -53,6 +54,8 @@ pub(crate) fn read(
         document: &document,
         hierarchy,
         images: Images::default(),
+        textures: HashMap::new(),
+        size: 0,
         mappings: vec![None; document.materials.len() + 1],
         model,
         notes,
@@ -71,6 +74,10 @@ struct Reader<'a> {
     data: Data<'a>,
     hierarchy: Hierarchy,
     images: Images,
+    /// The model's numbers of images that are textures as they are, by the texture.
+    textures: HashMap<usize, usize>,
+    /// Triangles or vertices so far.
+    size: usize,
     /// Of each material that is in use; the last one is that of meshes without a material.
     mappings: Vec<Option<Mappings>>,
     model: Model,
@@ -118,6 +125,9 @@ impl Reader<'_> {
             let wanted = Wanted { called: &called, weights, joints, color, emission, has_alpha, material: of_model };
             let local = primitive::read(&self.data, primitive, &wanted, &mut self.notes).map_err(within)?;
             let Some((local, is_skinned)) = local else { continue };
+            if is_skinned && places.len() > 1 {
+                self.notes.about(&called, "its instances are ignored, as joints place it");
+            }
             let places = if is_skinned { &[Mat4::IDENTITY][..] } else { &places };
             self.check_room(&local, places.len()).map_err(within)?;
             let uses = &mut self.uses[material];
@@ -126,7 +136,11 @@ impl Reader<'_> {
                 uses.meshes.push(called.clone());
             }
             self.note_names(material, index, mesh_index);
-            self.model.add(placed(&local, places));
+            let mesh = placed(&local, places);
+            if let Some(corner) = mesh.positions.iter().find(|corner| !corner.is_finite()) {
+                return Err(within(format!("a vertex is at {corner}").into()));
+            }
+            self.model.add(mesh);
         }
         Ok(())
     }
@@ -162,8 +176,8 @@ impl Reader<'_> {
             read.map_err(|error| format!("{called}: {error}"))?
         };
         let mut material = surface.material;
-        material.color_map = surface.color_map.map(|image| self.model.bitmap(image));
-        material.emission_map = surface.emission_map.map(|image| self.model.bitmap(image));
+        material.color_map = surface.color_map.map(|map| self.bitmap(map));
+        material.emission_map = surface.emission_map.map(|map| self.bitmap(map));
         let mappings = [surface.color_mapping, surface.emission_mapping];
         let number = self.model.material(material).material;
         self.mappings[index] = Some(mappings);
@@ -171,23 +185,31 @@ impl Reader<'_> {
         Ok((mappings, number))
     }
 
-    fn check_room(&self, mesh: &Mesh, copies: usize) -> Result<(), Error> {
-        let most = self.data.limits.triangles;
-        let size = |mesh: &Mesh| mesh.indices.len().max(mesh.positions.len());
-        let known: usize = self.model.meshes.iter().map(size).sum();
-        let fits = size(mesh).checked_mul(copies).and_then(|new| new.checked_add(known));
-        if fits.is_none_or(|all| all > most) {
-            return Err(format!("with its {copies} copies the scene has more than {most} triangles or vertices").into());
+    /// The model's number of an image.
+    fn bitmap(&mut self, map: Map) -> usize {
+        if let Some(&known) = map.texture.and_then(|texture| self.textures.get(&texture)) {
+            return known;
         }
+        let number = self.model.bitmap(map.bitmap);
+        if let Some(texture) = map.texture {
+            self.textures.insert(texture, number);
+        }
+        number
+    }
+
+    /// Refuses a mesh that makes the scene too large.
+    fn check_room(&mut self, mesh: &Mesh, copies: usize) -> Result<(), Error> {
+        let most = self.data.limits.triangles;
+        let size = mesh.indices.len().max(mesh.positions.len());
+        let all = size.checked_mul(copies).and_then(|new| new.checked_add(self.size)).filter(|&all| all <= most);
+        self.size =
+            all.ok_or_else(|| format!("with {copies} of it the scene has more than {most} triangles or vertices"))?;
         Ok(())
     }
 
     /// Checks what was read. Returns its bounds.
     fn check(&self) -> Result<[Vec3; 2], Error> {
         let corners = || self.model.meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
-        if let Some(corner) = corners().find(|corner| !corner.is_finite()) {
-            return Err(format!("a vertex is at {corner}").into());
-        }
         let has_triangles = self.model.meshes.iter().any(|mesh| !mesh.indices.is_empty());
         let [Some(low), Some(high)] = [corners().reduce(Vec3::min), corners().reduce(Vec3::max)] else {
             return Err("it holds no triangles".into());

@@ -21,10 +21,25 @@ const BRIGHTEST: f32 = 1e20;
 /// A material with its own images, and where these are read.
 pub(super) struct Surface {
     pub(super) material: Material,
-    pub(super) color_map: Option<Bitmap>,
+    pub(super) color_map: Option<Map>,
     pub(super) color_mapping: Option<Mapping>,
-    pub(super) emission_map: Option<Bitmap>,
+    pub(super) emission_map: Option<Map>,
     pub(super) emission_mapping: Option<Mapping>,
+}
+
+/// An image of a material.
+#[derive(Clone)]
+pub(super) struct Map {
+    pub(super) bitmap: Bitmap,
+    /// The texture that it is, if nothing else was put into it: materials share such.
+    pub(super) texture: Option<usize>,
+}
+
+impl Map {
+    /// An image that no other material has.
+    const fn own(bitmap: Bitmap) -> Self {
+        Self { bitmap, texture: None }
+    }
 }
 
 #[derive(Deserialize)]
@@ -84,7 +99,7 @@ impl Reading<'_, '_> {
         let [metallic, roughness] = self.metallic_roughness(source, &mut base);
         let mut material = Material::new(source.name.as_deref().unwrap_or_default(), base.factor.xyz().max(Vec3::ZERO));
         material.two_sided = source.double_sided;
-        let mut image = base.texture.as_ref().map(|info| self.bitmap(info)).transpose()?;
+        let mut image = base.texture.as_ref().map(|info| self.map(info)).transpose()?;
         let mut color_mapping = base.texture.as_ref().map(mapping).transpose()?;
 
         let transmission = extension::<Transmission>(&source.extensions, "KHR_materials_transmission")?;
@@ -97,12 +112,12 @@ impl Reading<'_, '_> {
             material.color *= share;
             if let Some(info) = &transmission.transmission_texture {
                 let own = mapping(info)?;
-                let shares = self.bitmap(info)?;
+                let shares = self.map(info)?.bitmap;
                 if color_mapping.is_some_and(|color| color != own) {
                     self.note("its transmission's image is read where that of the base color is");
                 }
                 color_mapping = color_mapping.or(Some(own));
-                image = Some(multiplied(&shares, image.as_ref()));
+                image = Some(Map::own(multiplied(&shares, image.as_ref().map(|image| &image.bitmap))));
             }
         } else if share > 0.0 || diffuse > 0.0 {
             material.lobe = Lobe::Translucent(share.max(diffuse).min(1.0));
@@ -133,14 +148,14 @@ impl Reading<'_, '_> {
         surface.material.emission = emission;
         // An image that nothing multiplies is not needed.
         if let Some(info) = source.emissive_texture.as_ref().filter(|_| surface.material.emits()) {
-            surface.emission_map = Some(self.bitmap(info)?);
+            surface.emission_map = Some(self.map(info)?);
             surface.emission_mapping = Some(mapping(info)?);
         }
         Ok(())
     }
 
-    fn bitmap(&mut self, info: &TextureInfo) -> Result<Bitmap, Error> {
-        bitmap(info, self.data, self.images)
+    fn map(&mut self, info: &TextureInfo) -> Result<Map, Error> {
+        Ok(Map { bitmap: bitmap(info, self.data, self.images)?, texture: Some(info.index) })
     }
 
     fn note(&mut self, text: &str) {
@@ -186,7 +201,7 @@ impl Reading<'_, '_> {
         if source.extensions.contains_key("KHR_materials_diffuse_transmission") {
             self.note("of KHR_materials_diffuse_transmission, color and images are ignored");
         }
-        for name in source.extensions.keys().filter(|name| !extensions::HONORED.contains(&name.as_str())) {
+        for name in source.extensions.keys().filter(|name| !extensions::KNOWN.contains(&name.as_str())) {
             self.note(&format!("its {} is ignored", name.escape_debug()));
         }
     }
@@ -212,16 +227,16 @@ impl Base {
     }
 }
 
-fn with_alpha_mode(source: &Source, alpha: f32, material: &mut Material, image: Option<Bitmap>) -> Option<Bitmap> {
+fn with_alpha_mode(source: &Source, alpha: f32, material: &mut Material, image: Option<Map>) -> Option<Map> {
     match source.alpha_mode.as_deref() {
         Some("MASK") => {
             let cutoff = source.alpha_cutoff.unwrap_or(0.5);
             material.masked = true;
             let scale = alpha * 0.5 / cutoff.max(1e-3);
             match image {
-                Some(image) => Some(with_alpha(image, scale)),
+                Some(image) => Some(Map::own(with_alpha(image.bitmap, scale))),
                 // Nothing is left of it, or all.
-                None if alpha < cutoff => Some(Bitmap::draw(1, 1, |_| Vec4::new(1.0, 1.0, 1.0, 0.0))),
+                None if alpha < cutoff => Some(Map::own(Bitmap::draw(1, 1, |_| Vec4::new(1.0, 1.0, 1.0, 0.0)))),
                 None => None,
             }
         }
@@ -229,7 +244,7 @@ fn with_alpha_mode(source: &Source, alpha: f32, material: &mut Material, image: 
             material.lobe = Lobe::Clear;
             let alpha = alpha.clamp(0.0, 1.0);
             material.color = if image.is_some() { Vec3::ONE } else { Vec3::splat(1.0 - alpha) };
-            image.map(|image| clear_by_alpha(&image, alpha))
+            image.map(|image| Map::own(clear_by_alpha(&image.bitmap, alpha)))
         }
         _ => image,
     }

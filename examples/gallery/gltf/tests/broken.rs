@@ -51,6 +51,7 @@ fn places_are_named() {
         ("/accessors/0/bufferView", json!(9), "there is no buffer view 9"),
         ("/bufferViews/0/byteLength", json!(4_000_000_000_u32), "buffer view 0 reaches beyond"),
         ("/asset/version", json!("1.0"), "glTF 1.0"),
+        ("/nodes/0/translation", json!([0, 1e39, 0]), "node 0 `lamp`: mesh 0, primitive 0: a vertex is at"),
         ("/nodes/1/scale", json!([1e9, 1, 1]), "was it exported in other units?"),
     ] {
         let error = changed(path, value);
@@ -67,6 +68,9 @@ fn other_bytes() {
     assert!(fails(b"glTF\x01\0\0\0").contains("version 1"));
     let glb = File::lamp().glb();
     assert!(fails(&glb[..100]).contains("cut short"));
+    assert!(fails(b"{\"asset\":{\"version\":\"2.0\"},\"nodes\":5}").contains("line 1 column"));
+    let marked = [b"\xef\xbb\xbf", &File::lamp().bytes()[..]].concat();
+    assert!(read(&marked, None, "window", None, LIMITS).is_ok());
     assert!(fails("[".repeat(100_000).as_bytes()).contains("no glTF file"));
 }
 

@@ -132,6 +132,13 @@ fn metallic_and_roughness_of_an_image() {
     read.assert_note(&["material 1 `floor`", "means of their image"]);
 }
 
+#[test]
+fn materials_share_images() {
+    let mut file = quarter();
+    file.json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": 0 });
+    assert_eq!(file.read().model.bitmaps.len(), 1);
+}
+
 const KTX2: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 
 #[test]
