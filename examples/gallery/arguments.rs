@@ -26,7 +26,8 @@ Options:
   --exr PATH              the last image that is rendered with fanlight in linear RGB, .exr
 
 For a FILE:
-  --portal-prefix PREFIX  meshes whose material's name starts with it are portals [window]
+  --list                  print what the file holds, and what became a light or a portal; render nothing
+  --portal-prefix PREFIX  meshes whose material's name starts with it are portals, in capitals or not [window]
   --env FILE              latitude-longitude environment, .hdr or .exr, or `none` [a clear sky with a sun]
   --bounces N             surfaces that light may touch on its way [5]
 ";
@@ -47,6 +48,7 @@ pub(crate) struct Arguments {
     pub(crate) seed: u32,
     pub(crate) output: Option<PathBuf>,
     pub(crate) exr: Option<PathBuf>,
+    pub(crate) lists: bool,
     pub(crate) portal_prefix: String,
     pub(crate) environment: Option<PathBuf>,
     pub(crate) bounces: u32,
@@ -62,6 +64,7 @@ impl Arguments {
             seed: 1,
             output: None,
             exr: None,
+            lists: false,
             portal_prefix: "window".to_owned(),
             environment: None,
             bounces: 5,
@@ -85,6 +88,7 @@ impl Arguments {
                 Long("seed") => arguments.seed = parser.value()?.parse()?,
                 Long("output") => arguments.output = Some(parser.value()?.into()),
                 Long("exr") => arguments.exr = Some(parser.value()?.into()),
+                Long("list") => arguments.lists = true,
                 Long("portal-prefix") => arguments.portal_prefix = parser.value()?.string()?,
                 Long("env") => arguments.environment = Some(parser.value()?.into()),
                 Long("bounces") => arguments.bounces = parser.value()?.parse_with(positive)?,

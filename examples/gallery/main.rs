@@ -68,7 +68,19 @@ fn render_file(path: &Path, arguments: &Arguments) -> Result<(), Error> {
         Some(path) => Some(Sky::new(read_rgb(path)?)),
         None => Some(Daylight::new().draw()),
     };
-    let mut model = gltf::read(path, &arguments.portal_prefix, sky)?;
+    let read =
+        || gltf::read(&std::fs::read(path)?, path.parent(), &arguments.portal_prefix, sky, gltf::Limits::RENDERABLE);
+    let gltf::Read { mut model, notes, contents } =
+        read().map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    for note in notes {
+        eprintln!("note: {note}");
+    }
+    for line in contents.iter().take(if arguments.lists { contents.len() } else { 2 }) {
+        println!("{line}");
+    }
+    if arguments.lists {
+        return Ok(());
+    }
     resize(&mut model, arguments);
     let comparison = studies::without_and_with("file", &model, &[arguments.bounces], effort(arguments))?;
     let picture = arguments.output.clone().unwrap_or_else(|| path.with_extension("png"));

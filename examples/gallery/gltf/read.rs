@@ -1,151 +1,341 @@
 //! Reads a model from glTF.
 
+use std::collections::HashMap;
 use std::path::Path;
 
-use glam::{Mat3, Mat4, Vec2, Vec3};
-use gltf::image::Source;
+use glam::{Mat3, Mat4, Vec3};
 
-use super::surface;
-use crate::render::{Camera, Error, Mesh, Model, Sky};
+use super::contents::{self, Uses, starts_with};
+use super::data::{Data, Limits};
+use super::document::{Document, member};
+use super::hierarchy::Hierarchy;
+use super::images::Images;
+use super::instances::instances;
+use super::notes::Notes;
+use super::primitive::{self, Wanted};
+use super::surface::{Map, Reading, Surface};
+use super::texture::Mapping;
+use super::{container, extensions, lamps, skin};
+use crate::render::{Camera, Error, Material, Mesh, Model, Sky};
 
-/// Longest side of a scene: what is further than a thousand kilometres is a mistake in its units.
+/// Longest side of a scene: what is further than a thousand kilometers is a mistake in its units.
 const LARGEST: f32 = 1e6;
 /// And the shortest.
 const SMALLEST: f32 = 1e-3;
-/// Most triangles of a scene.
-const MOST: usize = 50_000_000;
 
-/// Reads a scene. Its environment is not in the file.
-pub(crate) fn read(path: &Path, portal_prefix: &str, sky: Option<Sky>) -> Result<Model, Error> {
-    read_model(path, portal_prefix, sky).map_err(|error| format!("cannot read {}: {error}", path.display()).into())
+/// A scene, and what should be known of it.
+pub(crate) struct Read {
+    pub(crate) model: Model,
+    /// What was ignored, or became something else than the file says.
+    pub(crate) notes: Vec<String>,
+    /// What the file holds, and what became of it.
+    pub(crate) contents: Vec<String>,
 }
 
-fn read_model(path: &Path, portal_prefix: &str, sky: Option<Sky>) -> Result<Model, Error> {
-    let bytes = std::fs::read(path)?;
-    let file = gltf::Gltf::from_slice(&bytes).map_err(|error| format!("this is not a glTF 2.0 file ({error})"))?;
-    let folder = path.parent();
-    let buffers = gltf::import_buffers(&file.document, folder, file.blob)
-        .map_err(|error| format!("its .bin file cannot be read ({error})"))?;
-    let images: Vec<_> = (file.document.images().enumerate())
-        .map(|(i, image)| {
-            gltf::image::Data::from_source(image.source(), folder, &buffers).map_err(|error| {
-                let name = match image.source() {
-                    Source::Uri { uri, .. } if !uri.starts_with("data:") => uri,
-                    _ => image.name().unwrap_or("inside of the file"),
-                };
-                format!("its image {i} ({name}) cannot be read ({error})")
-            })
-        })
-        .collect::<Result<_, _>>()?;
-
-    let scene = file.document.default_scene().or_else(|| file.document.scenes().next()).ok_or("it holds no scene")?;
+/// Reads a scene from the bytes of a file, and from others in its folder, if there is one. Its environment is not in the
+/// file.
+pub(crate) fn read(
+    bytes: &[u8],
+    folder: Option<&Path>,
+    portal_prefix: &str,
+    sky: Option<Sky>,
+    limits: Limits,
+) -> Result<Read, Error> {
+    let (document, blob) = container::parse(bytes)?;
+    let mut notes = Notes::default();
+    extensions::check(&document, &mut notes)?;
+    let hierarchy = Hierarchy::new(&document, &mut notes)?;
     let camera = Camera::looking(Vec3::ONE, Vec3::ZERO, 60.0);
-    let mut reader = Reader { model: Model::new(camera, sky), buffers, has_camera: false };
-    portal_prefix.clone_into(&mut reader.model.portal_prefix);
-    for material in file.document.materials() {
-        let read = surface::material(&material, &images, &mut reader.model.bitmaps)?;
-        reader.model.materials.push(read);
-    }
-    // For meshes without a material.
-    reader.model.material(crate::render::Material::new("", Vec3::splat(0.8)));
-    for node in scene.nodes() {
-        reader.add_node(&node, Mat4::IDENTITY)?;
-    }
-    reader.finish()
+    let mut model = Model::new(camera, sky);
+    portal_prefix.clone_into(&mut model.portal_prefix);
+    let uses = (0..=document.materials.len()).map(|_| Uses::default()).collect();
+    let mut reader = Reader {
+        data: Data::new(&document, folder, blob, limits),
+        document: &document,
+        hierarchy,
+        images: Images::default(),
+        textures: HashMap::new(),
+        size: 0,
+        mappings: vec![None; document.materials.len() + 1],
+        model,
+        notes,
+        uses,
+        contents: vec![],
+    };
+    reader.read()?;
+    Ok(Read { model: reader.model, notes: reader.notes.lines(), contents: reader.contents })
 }
 
-struct Reader {
+/// Where a material's images are read: that of its color, and that of its emission.
+type Mappings = [Option<Mapping>; 2];
+
+struct Reader<'a> {
+    document: &'a Document,
+    data: Data<'a>,
+    hierarchy: Hierarchy,
+    images: Images,
+    /// The model's numbers of images that are textures as they are, by the texture.
+    textures: HashMap<usize, usize>,
+    /// Triangles or vertices so far.
+    size: usize,
+    /// Of each material that is in use; the last one is that of meshes without a material.
+    mappings: Vec<Option<Mappings>>,
     model: Model,
-    buffers: Vec<gltf::buffer::Data>,
-    has_camera: bool,
+    notes: Notes,
+    uses: Vec<Uses>,
+    contents: Vec<String>,
 }
 
-impl Reader {
-    fn add_node(&mut self, node: &gltf::Node<'_>, parent: Mat4) -> Result<(), Error> {
-        let transform = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
-        for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
-            if primitive.mode() == gltf::mesh::Mode::Triangles {
-                self.add_primitive(&primitive, node.name().unwrap_or("without a name"), transform)?;
-            }
+impl Reader<'_> {
+    fn read(&mut self) -> Result<(), Error> {
+        for index in self.hierarchy.visible.clone() {
+            self.add_node(index).map_err(|error| format!("{}: {error}", self.document.node(index)))?;
         }
-        if let Some(camera) = node.camera().filter(|_| !self.has_camera)
-            && let gltf::camera::Projection::Perspective(perspective) = camera.projection()
-        {
-            let axes = Mat3::from_mat4(transform);
-            let axes = Mat3::from_cols(axes.x_axis.normalize(), axes.y_axis.normalize(), axes.z_axis.normalize());
-            self.model.camera = Camera::new(transform.w_axis.truncate(), axes, perspective.yfov());
-            self.has_camera = true;
-        }
-        node.children().try_for_each(|child| self.add_node(&child, transform))
-    }
-
-    fn add_primitive(&mut self, primitive: &gltf::Primitive<'_>, name: &str, transform: Mat4) -> Result<(), Error> {
-        let reader = primitive.reader(|buffer| Some(&self.buffers[buffer.index()]));
-        let positions = reader.read_positions().ok_or_else(|| format!("mesh `{name}` has no positions"))?;
-        let positions: Vec<Vec3> = positions.map(|position| transform.transform_point3(position.into())).collect();
-        let indices: Vec<u32> = match reader.read_indices() {
-            Some(indices) => indices.into_u32().collect(),
-            None => (0..positions.len() as u32).collect(),
-        };
-        let mirrored = Mat3::from_mat4(transform).determinant() < 0.0;
-        let indices: Vec<[u32; 3]> = (indices.as_chunks::<3>().0.iter())
-            .map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] })
-            .collect();
-        if let Some(index) = indices.as_flattened().iter().find(|&&index| index as usize >= positions.len()) {
-            return Err(format!("mesh `{name}` uses vertex {index}, but has {}", positions.len()).into());
-        }
-        let set = surface::coordinate_set(&primitive.material());
-        let uvs: Vec<Vec2> = match (set, set.and_then(|set| reader.read_tex_coords(set))) {
-            (_, Some(uvs)) => uvs.into_f32().map(Vec2::from).collect(),
-            (None, None) => vec![Vec2::ZERO; positions.len()],
-            (Some(set), None) => {
-                let material = primitive.material().name().unwrap_or_default().to_owned();
-                return Err(format!(
-                    "mesh `{name}` has no texture coordinates TEXCOORD_{set}, but its material `{material}` has an image"
-                )
-                .into());
-            }
-        };
-        let material = primitive.material().index().unwrap_or(self.model.materials.len() - 1);
-        self.model.add(Mesh { positions, uvs, indices, material });
+        let [low, high] = self.check()?;
+        self.place_camera(low, high)?;
+        self.add_lamps((high - low).length())?;
+        self.conclude();
         Ok(())
     }
 
-    /// Checks what was read, and tells what fanlight will do with it.
-    fn finish(mut self) -> Result<Model, Error> {
-        let corners = || self.model.meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
-        if let Some(corner) = corners().find(|corner| !corner.is_finite()) {
-            return Err(format!("a vertex is at {corner}").into());
+    fn add_node(&mut self, index: usize) -> Result<(), Error> {
+        let node = member(&self.document.nodes, "node", index)?;
+        let Some(mesh_index) = node.mesh else { return Ok(()) };
+        let mesh = member(&self.document.meshes, "mesh", mesh_index)?;
+        let called = self.document.mesh(mesh_index);
+        let joints = match node.skin {
+            Some(skin) => {
+                self.notes.about(&called, "it has a skin, and is posed as its joints stand in the file");
+                Some(skin::joints(&self.data, skin, &self.hierarchy.globals)?)
+            }
+            None => None,
+        };
+        let global = self.hierarchy.globals[index];
+        let places: Vec<Mat4> = instances(&self.data, node)?.into_iter().map(|place| global * place).collect();
+        let weights = if node.weights.is_empty() { &mesh.weights } else { &node.weights };
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            let within = |error: Error| Error::from(format!("{called}, primitive {number}: {error}"));
+            if let Some(material) = primitive.material {
+                member(&self.document.materials, "material", material).map_err(within)?;
+            }
+            let material = primitive.material.unwrap_or(self.document.materials.len());
+            let ([color, emission], of_model) = self.material(material).map_err(within)?;
+            let joints = joints.as_deref();
+            let has_alpha = self.model.materials[of_model].has_holes();
+            let wanted = Wanted { called: &called, weights, joints, color, emission, has_alpha, material: of_model };
+            let local = primitive::read(&self.data, primitive, &wanted, &mut self.notes).map_err(within)?;
+            let Some((local, is_skinned)) = local else { continue };
+            if is_skinned && places.len() > 1 {
+                self.notes.about(&called, "its instances are ignored, as joints place it");
+            }
+            let places = if is_skinned { &[Mat4::IDENTITY][..] } else { &places };
+            self.check_room(&local, places.len()).map_err(within)?;
+            let uses = &mut self.uses[material];
+            uses.triangles += local.indices.len() * places.len();
+            if uses.meshes.last() != Some(&called) {
+                uses.meshes.push(called.clone());
+            }
+            self.note_names(material, index, mesh_index);
+            let mesh = placed(&local, places);
+            if let Some(corner) = mesh.positions.iter().find(|corner| !corner.is_finite()) {
+                return Err(within(format!("a vertex is at {corner}").into()));
+            }
+            self.model.add(mesh);
         }
+        Ok(())
+    }
+
+    /// Remembers what is called like a portal.
+    fn note_names(&mut self, material: usize, node: usize, mesh: usize) {
+        let names = [
+            (self.document.nodes[node].name.as_deref(), self.document.node(node)),
+            (self.document.meshes[mesh].name.as_deref(), self.document.mesh(mesh)),
+        ];
+        for (name, called) in names {
+            if name.is_some_and(|name| starts_with(name, &self.model.portal_prefix)) {
+                self.uses[material].called_portal.push(called);
+            }
+        }
+    }
+
+    /// Where a material's images are read, and its number in the model. Reads it if this is its first use.
+    fn material(&mut self, index: usize) -> Result<(Mappings, usize), Error> {
+        let known = self.mappings.get(index).copied().flatten();
+        if let (Some(mappings), Some(number)) = (known, self.uses.get(index).and_then(|uses| uses.number)) {
+            return Ok((mappings, number));
+        }
+        let none = self.document.materials.len();
+        let surface = if index == none {
+            let material = Material::new("", Vec3::splat(0.8));
+            Surface { material, color_map: None, color_mapping: None, emission_map: None, emission_mapping: None }
+        } else {
+            let source = member(&self.document.materials, "material", index)?;
+            let called = self.document.material(index);
+            let (data, images, notes) = (&self.data, &mut self.images, &mut self.notes);
+            let read = Reading { data, images, notes, called: &called }.surface(source);
+            read.map_err(|error| format!("{called}: {error}"))?
+        };
+        let mut material = surface.material;
+        material.color_map = surface.color_map.map(|map| self.bitmap(map));
+        material.emission_map = surface.emission_map.map(|map| self.bitmap(map));
+        let mappings = [surface.color_mapping, surface.emission_mapping];
+        let number = self.model.material(material).material;
+        self.mappings[index] = Some(mappings);
+        self.uses[index].number = Some(number);
+        Ok((mappings, number))
+    }
+
+    /// The model's number of an image.
+    fn bitmap(&mut self, map: Map) -> usize {
+        if let Some(&known) = map.texture.and_then(|texture| self.textures.get(&texture)) {
+            return known;
+        }
+        let number = self.model.bitmap(map.bitmap);
+        if let Some(texture) = map.texture {
+            self.textures.insert(texture, number);
+        }
+        number
+    }
+
+    /// Refuses a mesh that makes the scene too large.
+    fn check_room(&mut self, mesh: &Mesh, copies: usize) -> Result<(), Error> {
+        let most = self.data.limits.triangles;
+        let size = mesh.indices.len().max(mesh.positions.len());
+        let all = size.checked_mul(copies).and_then(|new| new.checked_add(self.size)).filter(|&all| all <= most);
+        self.size =
+            all.ok_or_else(|| format!("with {copies} of it the scene has more than {most} triangles or vertices"))?;
+        Ok(())
+    }
+
+    /// Checks what was read. Returns its bounds.
+    fn check(&self) -> Result<[Vec3; 2], Error> {
+        let corners = || self.model.meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
+        let has_triangles = self.model.meshes.iter().any(|mesh| !mesh.indices.is_empty());
         let [Some(low), Some(high)] = [corners().reduce(Vec3::min), corners().reduce(Vec3::max)] else {
             return Err("it holds no triangles".into());
         };
+        if !has_triangles {
+            return Err("it holds no triangles".into());
+        }
         let size = (high - low).max_element().max(low.abs().max_element()).max(high.abs().max_element());
-        if !(SMALLEST..=LARGEST).contains(&size) {
+        if !(SMALLEST..=LARGEST).contains(&size) || (high - low).max_element() < SMALLEST * SMALLEST {
             return Err(format!(
-                "the scene reaches from {low} to {high}, but its size must be from {SMALLEST} to {LARGEST:e} metres; \
+                "the scene reaches from {low} to {high}, but its size must be from {SMALLEST} to {LARGEST:e} meters; \
                  was it exported in other units?"
             )
             .into());
         }
-        let triangles: usize = self.model.meshes.iter().map(|mesh| mesh.indices.len()).sum();
-        if triangles > MOST {
-            return Err(format!("it holds {triangles} triangles, but at most {MOST} are rendered").into());
-        }
-        if !self.has_camera {
-            eprintln!("note: the file has no camera; looking from a corner of the scene to its middle");
-            self.model.camera = Camera::looking(low.lerp(high, 0.95), low.lerp(high, 0.45), 60.0);
-        }
-        let count = |wanted: &dyn Fn(&Mesh) -> bool| self.model.meshes.iter().filter(|mesh| wanted(mesh)).count();
-        let portals = count(&|mesh| self.model.is_portal(mesh));
-        let emitters = count(&|mesh| self.model.materials[mesh.material].emits());
-        println!("triangles: {triangles}, portal meshes: {portals}, emitting meshes: {emitters}");
-        if portals + emitters == 0 {
-            eprintln!(
-                "note: no material emits light, and none has a name that starts with `{}`: there is nothing to gain",
-                self.model.portal_prefix
-            );
-        }
-        Ok(self.model)
+        Ok([low, high])
     }
+
+    /// Takes the scene's first camera, or one that looks from a corner of the scene to its middle.
+    fn place_camera(&mut self, low: Vec3, high: Vec3) -> Result<(), Error> {
+        let nodes = &self.document.nodes;
+        let cameras = self.hierarchy.visible.iter().filter_map(|&node| Some((node, nodes[node].camera?)));
+        let cameras: Vec<_> = cameras.collect();
+        let Some(&(node, index)) = cameras.first() else {
+            self.notes.add("the scene has no camera; looking from a corner of the scene to its middle".to_owned());
+            self.model.camera = Camera::looking(low.lerp(high, 0.95), low.lerp(high, 0.45), 60.0);
+            self.contents.push("camera: none".to_owned());
+            return Ok(());
+        };
+        let name = self.document.node(node);
+        self.model.camera =
+            camera(self.document, index, &self.hierarchy.globals[node]).map_err(|error| format!("{name}: {error}"))?;
+        if cameras.len() > 1 {
+            self.notes.add(format!("the scene has {} cameras, of which that of {name} is taken", cameras.len()));
+        }
+        let kind = if self.model.camera.parallel.is_some() { "orthographic" } else { "perspective" };
+        self.contents.push(format!("camera: that of {name}, {kind}"));
+        Ok(())
+    }
+
+    fn add_lamps(&mut self, diagonal: f32) -> Result<(), Error> {
+        for index in self.hierarchy.visible.clone() {
+            let node = &self.document.nodes[index];
+            let within = |error: Error| Error::from(format!("{}: {error}", self.document.node(index)));
+            let Some((lamp, called)) = lamps::of_node(self.document, node).map_err(within)? else { continue };
+            let global = self.hierarchy.globals[index];
+            if !global.is_finite() || global.w_axis.truncate().abs().max_element() > LARGEST {
+                return Err(within(format!("{called} is at {}", global.w_axis.truncate()).into()));
+            }
+            lamps::add(&mut self.model, &lamp, &called, &global, diagonal, &mut self.notes)
+                .map_err(|error| within(format!("{called}: {error}").into()))?;
+            self.contents.push(format!("{called} of {}: {}", self.document.node(index), lamp.kind.escape_debug()));
+        }
+        Ok(())
+    }
+
+    /// Tells what the file holds, and what `fanlight` will do with it.
+    fn conclude(&mut self) {
+        contents::note_near_misses(self.document, &self.model, &self.uses, &mut self.notes);
+        let triangles: usize = self.model.meshes.iter().map(|mesh| mesh.indices.len()).sum();
+        let [lights, portals] = contents::count(&self.model);
+        let Document { nodes, meshes, materials, images, .. } = self.document;
+        let mut lines = vec![
+            format!(
+                "nodes: {}, of which {} are in the scene; meshes: {}; materials: {}; images: {}",
+                nodes.len(),
+                self.hierarchy.visible.len(),
+                meshes.len(),
+                materials.len(),
+                images.len()
+            ),
+            format!("triangles: {triangles}, portal meshes: {portals}, emitting meshes: {lights}"),
+        ];
+        lines.append(&mut self.contents);
+        lines.append(&mut contents::list(self.document, &self.model, &self.uses));
+        lines.extend((0..images.len()).map(|i| format!("{}: {}", self.document.image(i), self.images.state(i))));
+        self.contents = lines;
+        if lights + portals == 0 && self.model.sky.is_none() {
+            self.notes.add("nothing emits light, and there is no environment: all is black".to_owned());
+        } else if lights + portals == 0 {
+            let prefix = &self.model.portal_prefix;
+            self.notes.add(format!(
+                "no material emits light, and none that lets light through has a name that starts with `{prefix}`: \
+                 there is nothing to gain"
+            ));
+        }
+    }
+}
+
+fn camera(document: &Document, index: usize, transform: &Mat4) -> Result<Camera, Error> {
+    let camera = member(&document.cameras, "camera", index)?;
+    let axes = Mat3::from_mat4(*transform);
+    let axis = |axis: Vec3, otherwise| axis.normalize_or(otherwise);
+    let axes = Mat3::from_cols(axis(axes.x_axis, Vec3::X), axis(axes.y_axis, Vec3::Y), axis(axes.z_axis, Vec3::Z));
+    let position = transform.w_axis.truncate();
+    if !position.is_finite() || position.abs().max_element() > LARGEST {
+        return Err(format!("the camera is at {position}").into());
+    }
+    match (&camera.perspective, &camera.orthographic) {
+        (Some(perspective), _) if perspective.yfov > 0.0 && perspective.yfov < core::f32::consts::PI => {
+            Ok(Camera::new(position, axes, perspective.yfov))
+        }
+        (None, Some(orthographic)) if orthographic.ymag.abs() > 0.0 && orthographic.ymag.abs() <= LARGEST => {
+            Ok(Camera::new(position, axes, 1.0).parallel(2.0 * orthographic.ymag.abs()))
+        }
+        _ => {
+            let name = super::document::called("camera", index, camera.name.as_deref());
+            Err(format!("{name} has no field of view between 0 and 180 degrees, and no height").into())
+        }
+    }
+}
+
+/// Copies of a mesh in the world, as one mesh.
+fn placed(local: &Mesh, places: &[Mat4]) -> Mesh {
+    let mut all = Mesh::of(local.material);
+    for place in places {
+        let first = all.positions.len() as u32;
+        let is_mirrored = skin::mirrors(place);
+        all.positions.extend(local.positions.iter().map(|&position| place.transform_point3(position)));
+        all.uvs.extend(&local.uvs);
+        all.emission_uvs.extend(&local.emission_uvs);
+        all.colors.extend(&local.colors);
+        all.indices.extend(local.indices.iter().map(|corners| {
+            let [a, b, c] = corners.map(|i| first + i);
+            if is_mirrored { [a, c, b] } else { [a, b, c] }
+        }));
+    }
+    all
 }

@@ -1,4 +1,4 @@
-//! A pinhole camera.
+//! A pinhole camera, or one that looks along parallel rays.
 
 use glam::{Mat3, Vec2, Vec3, vec3};
 
@@ -12,6 +12,8 @@ pub(crate) struct Camera {
     pub(crate) axes: Mat3,
     /// Vertical field of view in radians.
     pub(crate) field_of_view: f32,
+    /// Height of what is seen if all rays are parallel.
+    pub(crate) parallel: Option<f32>,
 }
 
 impl Camera {
@@ -24,7 +26,12 @@ impl Camera {
 
     /// A camera with these axes and this vertical field of view in radians.
     pub(crate) const fn new(position: Vec3, axes: Mat3, field_of_view: f32) -> Self {
-        Self { width: 208, height: 156, position, axes, field_of_view }
+        Self { width: 208, height: 156, position, axes, field_of_view, parallel: None }
+    }
+
+    /// The same with parallel rays, which see this height.
+    pub(crate) const fn parallel(self, height: f32) -> Self {
+        Self { parallel: Some(height), ..self }
     }
 
     /// The same with another number of pixels.
@@ -44,9 +51,13 @@ impl Camera {
 
     /// Start and unit direction of the ray through a point of the image, in pixels from its upper left corner.
     pub(crate) fn ray(&self, point: Vec2) -> (Vec3, Vec3) {
-        let pixel = 2.0 * (0.5 * self.field_of_view).tan() / self.height as f32;
+        let height = self.parallel.unwrap_or_else(|| 2.0 * (0.5 * self.field_of_view).tan());
+        let pixel = height / self.height as f32;
         let x = (point.x - 0.5 * self.width as f32) * pixel;
         let y = (0.5 * self.height as f32 - point.y) * pixel;
-        (self.position, self.axes * vec3(x, y, -1.0).normalize())
+        match self.parallel {
+            Some(_) => (self.position + self.axes * vec3(x, y, 0.0), self.axes * vec3(0.0, 0.0, -1.0)),
+            None => (self.position, self.axes * vec3(x, y, -1.0).normalize()),
+        }
     }
 }

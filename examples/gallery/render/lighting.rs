@@ -54,7 +54,7 @@ impl Lights {
             .collect();
         let mut builder = LightSampler::builder().illumination(illumination).environment(environment(model)?);
         for (mesh, weight) in emitters.iter().zip(&emission) {
-            let mesh_light = Mesh::emitter(&mesh.positions, &mesh.indices).uvs(&mesh.uvs);
+            let mesh_light = Mesh::emitter(&mesh.positions, &mesh.indices).uvs(mesh.emission_uvs());
             weight.add(&mut builder, mesh_light.sides(sides(&model.materials[mesh.material])))?;
         }
         for (mesh, weight) in portals.iter().zip(&transmission) {

@@ -33,6 +33,8 @@ pub(crate) struct Material {
     pub(crate) emission_map: Option<usize>,
     /// Whether light leaves from both sides; from the front alone otherwise.
     pub(crate) two_sided: bool,
+    /// Whether the emission takes the place of the color, so that the colors of vertices multiply it.
+    pub(crate) unlit: bool,
 }
 
 impl Material {
@@ -47,6 +49,7 @@ impl Material {
             emission: Vec3::ZERO,
             emission_map: None,
             two_sided: false,
+            unlit: false,
         }
     }
 
@@ -91,10 +94,10 @@ impl Material {
     }
 
     /// What passes straight through at a place; `None` if it is solid there.
-    pub(crate) fn passes(&self, bitmaps: &[Bitmap], uv: Vec2) -> Option<Vec3> {
+    pub(crate) fn passes(&self, bitmaps: &[Bitmap], uv: Vec2, tint: impl FnOnce() -> Vec3) -> Option<Vec3> {
         if self.masked && self.color_map.is_some_and(|map| bitmaps[map].at(uv).w < 0.5) {
             return Some(Vec3::ONE);
         }
-        (self.lobe == Lobe::Clear).then(|| self.color_at(bitmaps, uv))
+        (self.lobe == Lobe::Clear).then(|| tint() * self.color_at(bitmaps, uv))
     }
 }

@@ -10,6 +10,10 @@ pub(crate) struct Mesh {
     pub(crate) positions: Vec<Vec3>,
     /// One a vertex.
     pub(crate) uvs: Vec<Vec2>,
+    /// Where the emission's image is read, one a vertex; empty if that is where all others are.
+    pub(crate) emission_uvs: Vec<Vec2>,
+    /// Multiplies the material's color, one a vertex; empty if all are white.
+    pub(crate) colors: Vec<Vec3>,
     pub(crate) indices: Vec<[u32; 3]>,
     pub(crate) material: usize,
 }
@@ -18,6 +22,11 @@ impl Mesh {
     /// Nothing yet, of some material.
     pub(crate) fn of(material: usize) -> Self {
         Self { material, ..Self::default() }
+    }
+
+    /// Where the emission's image is read, one a vertex.
+    pub(crate) fn emission_uvs(&self) -> &[Vec2] {
+        if self.emission_uvs.is_empty() { &self.uvs } else { &self.emission_uvs }
     }
 
     /// Adds a parallelogram. Its front is where `u` to `v` turns counter-clockwise.

@@ -31,7 +31,7 @@ pub(crate) struct Model {
     /// Texels a side of the sky's image that guides the sampling; as many as it has itself if there is no number.
     pub(crate) guide_texels: Option<usize>,
     pub(crate) fog: Option<Fog>,
-    /// Materials whose names start with this are portals.
+    /// Materials whose names start with this are portals, in capitals or not.
     pub(crate) portal_prefix: String,
 }
 
@@ -67,8 +67,9 @@ impl Model {
         self.meshes.push(mesh);
     }
 
-    /// Whether a mesh was flagged as a portal by the name of its material.
+    /// Whether a mesh was flagged as a portal by the name of its material, in capitals or not.
     pub(crate) fn is_portal(&self, mesh: &Mesh) -> bool {
-        self.materials[mesh.material].name.starts_with(&self.portal_prefix)
+        let start = self.materials[mesh.material].name.get(..self.portal_prefix.len());
+        start.is_some_and(|start| start.eq_ignore_ascii_case(&self.portal_prefix))
     }
 }

@@ -31,6 +31,10 @@ pub(crate) struct Point {
     /// Whether that is the front.
     pub(crate) front: bool,
     pub(crate) uv: Vec2,
+    /// Where the emission's image is read.
+    pub(crate) emission_uv: Vec2,
+    /// Multiplies the material's color.
+    pub(crate) tint: Vec3,
     /// Weights of the triangle's second and third vertex.
     pub(crate) barycentrics: [f32; 2],
     /// Number of the triangle in the order of the model's meshes.
@@ -55,13 +59,29 @@ impl Point {
     }
 }
 
+/// What a triangle is made of.
+#[derive(Clone, Copy)]
+struct Surface {
+    material: u32,
+    /// Whether rays may pass straight through it.
+    has_holes: bool,
+    /// Its number among those with more than one set of texture coordinates or with colors of their own.
+    layers: Option<u32>,
+}
+
+/// What few triangles have.
+struct Layers {
+    emission_uvs: [Vec2; 3],
+    colors: [Vec3; 3],
+}
+
 /// The surfaces, ready for ray casting.
 pub(crate) struct Scene {
     bvh: CwBvh,
     triangles: Vec<Triangle>,
     uvs: Vec<[Vec2; 3]>,
-    /// Each triangle's material, and whether rays may pass straight through it.
-    surfaces: Vec<(u32, bool)>,
+    surfaces: Vec<Surface>,
+    layers: Vec<Layers>,
     materials: Vec<Material>,
     bitmaps: Vec<Bitmap>,
     diagonal: f32,
@@ -70,13 +90,21 @@ pub(crate) struct Scene {
 impl Scene {
     /// Copies the surfaces of a model.
     pub(crate) fn new(model: &Model) -> Self {
-        let (mut triangles, mut uvs, mut surfaces) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut triangles, mut uvs, mut surfaces, mut layers) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for mesh in &model.meshes {
+            let has_layers = !(mesh.emission_uvs.is_empty() && mesh.colors.is_empty());
+            let has_holes = model.materials[mesh.material].has_holes();
             for corners in &mesh.indices {
                 let [v0, v1, v2] = corners.map(|i| Vec3A::from(mesh.positions[i as usize]));
                 triangles.push(Triangle { v0, v1, v2 });
                 uvs.push(corners.map(|i| mesh.uvs[i as usize]));
-                surfaces.push((mesh.material as u32, model.materials[mesh.material].has_holes()));
+                let number = has_layers.then_some(layers.len() as u32);
+                surfaces.push(Surface { material: mesh.material as u32, has_holes, layers: number });
+                if has_layers {
+                    let emission_uvs = corners.map(|i| mesh.emission_uvs()[i as usize]);
+                    let colors = corners.map(|i| mesh.colors.get(i as usize).copied().unwrap_or(Vec3::ONE));
+                    layers.push(Layers { emission_uvs, colors });
+                }
             }
         }
         let mut build_time = core::time::Duration::ZERO;
@@ -85,7 +113,7 @@ impl Scene {
         let (low, high) = (corners().reduce(Vec3::min), corners().reduce(Vec3::max));
         let diagonal = low.zip(high).map_or(1.0, |(low, high)| (high - low).length());
         let (materials, bitmaps) = (model.materials.clone(), model.bitmaps.clone());
-        Self { bvh, triangles, uvs, surfaces, materials, bitmaps, diagonal }
+        Self { bvh, triangles, uvs, surfaces, layers, materials, bitmaps, diagonal }
     }
 
     /// How far from surfaces rays start and end.
@@ -100,7 +128,7 @@ impl Scene {
 
     /// The material at a point.
     pub(crate) fn material(&self, point: &Point) -> &Material {
-        &self.materials[self.surfaces[point.triangle].0 as usize]
+        &self.materials[self.surfaces[point.triangle].material as usize]
     }
 
     /// The first solid surface along a ray, and what passes the clear ones before it.
@@ -158,9 +186,10 @@ impl Scene {
 
     /// What passes straight through a triangle where a ray meets it; `None` if it is solid there.
     fn passes_at(&self, triangle: usize, ray: &Ray, distance: f32) -> Option<Vec3> {
-        let (material, true) = self.surfaces[triangle] else { return None };
+        let Surface { material, has_holes: true, .. } = self.surfaces[triangle] else { return None };
         let barycentrics = self.barycentrics(triangle, ray.origin + distance * ray.direction);
-        self.materials[material as usize].passes(&self.bitmaps, self.uv(triangle, barycentrics))
+        let uv = self.uv(triangle, barycentrics);
+        self.materials[material as usize].passes(&self.bitmaps, uv, || self.tint(triangle, barycentrics))
     }
 
     fn point(&self, triangle: usize, origin: Vec3, direction: Vec3, distance: f32) -> Point {
@@ -171,12 +200,15 @@ impl Scene {
         let barycentrics = self.barycentrics(triangle, hit.into());
         // Back along the ray as well: where it comes from is free, even in corners that rounding is blind to.
         let away = self.offset() * (normal - direction);
+        let uv = self.uv(triangle, barycentrics);
         Point {
             position: hit + away,
             behind: hit - away,
             normal,
             front,
-            uv: self.uv(triangle, barycentrics),
+            uv,
+            emission_uv: self.layers(triangle).map_or(uv, |layers| interpolate(layers.emission_uvs, barycentrics)),
+            tint: self.tint(triangle, barycentrics),
             barycentrics,
             triangle,
             distance,
@@ -190,10 +222,25 @@ impl Scene {
         [(point - v0).cross(v2 - v0), (v1 - v0).cross(point - v0)].map(|part| part.dot(area) * scale)
     }
 
-    fn uv(&self, triangle: usize, [b1, b2]: [f32; 2]) -> Vec2 {
-        let [uv0, uv1, uv2] = self.uvs[triangle];
-        uv0 + b1 * (uv1 - uv0) + b2 * (uv2 - uv0)
+    fn uv(&self, triangle: usize, barycentrics: [f32; 2]) -> Vec2 {
+        interpolate(self.uvs[triangle], barycentrics)
     }
+
+    fn layers(&self, triangle: usize) -> Option<&Layers> {
+        self.surfaces[triangle].layers.map(|number| &self.layers[number as usize])
+    }
+
+    fn tint(&self, triangle: usize, barycentrics: [f32; 2]) -> Vec3 {
+        self.layers(triangle).map_or(Vec3::ONE, |layers| interpolate(layers.colors, barycentrics))
+    }
+}
+
+fn interpolate<T>([a, b, c]: [T; 3], [b1, b2]: [f32; 2]) -> T
+where
+    T: Copy + core::ops::Add<Output = T> + core::ops::Sub<Output = T>,
+    f32: core::ops::Mul<T, Output = T>,
+{
+    a + b1 * (b - a) + b2 * (c - a)
 }
 
 /// Distance along a ray to a triangle, infinite if there is none (Möller and Trumbore 1997).

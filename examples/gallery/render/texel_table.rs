@@ -72,7 +72,7 @@ impl TexelTable {
             for corners in &mesh.indices {
                 let triangle = table.triangles.len();
                 let [a, b, c] = corners.map(|i| mesh.positions[i as usize]);
-                let uvs = corners.map(|i| mesh.uvs[i as usize]);
+                let uvs = corners.map(|i| mesh.emission_uvs()[i as usize]);
                 let area = (b - a).cross(c - a).length();
                 for_each_part(uvs, [width, per_area.len() / width], |corners, texel| {
                     let share = (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]).abs();
@@ -115,7 +115,7 @@ impl TexelTable {
         let Densities { width, per_area } = &self.densities[point.triangle];
         let height = per_area.len() / width;
         let index = |place: f32, size: usize| ((place * size as f32) as usize).min(size - 1);
-        let texel = per_area[index(point.uv.y, height) * width + index(point.uv.x, *width)];
+        let texel = per_area[index(point.emission_uv.y, height) * width + index(point.emission_uv.x, *width)];
         let total = self.cumulative.last().copied().unwrap_or(f64::INFINITY);
         let pdf_area = (f64::from(texel) / total) as f32;
         pdf_area * point.distance * point.distance / point.normal.dot(direction).abs()

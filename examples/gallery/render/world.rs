@@ -75,7 +75,8 @@ impl World {
                 if !material.emits() || !(point.front || material.two_sided) {
                     return Vec3::ZERO;
                 }
-                material.emission_at(self.scene.bitmaps(), point.uv)
+                let emission = material.emission_at(self.scene.bitmaps(), point.emission_uv);
+                if material.unlit { emission * point.tint } else { emission }
             }
         }
     }
@@ -88,7 +89,8 @@ impl World {
     /// How a surface scatters light to where a ray that goes in a direction came from.
     pub(crate) fn bsdf(&self, point: &Point, direction: Vec3) -> Bsdf {
         let material = self.scene.material(point);
-        Bsdf::new(material.lobe, material.color_at(self.scene.bitmaps(), point.uv), point.normal, -direction)
+        let color = point.tint * material.color_at(self.scene.bitmaps(), point.uv);
+        Bsdf::new(material.lobe, color, point.normal, -direction)
     }
 
     fn passes_fog(&self, origin: Vec3, direction: Vec3, distance: f32) -> f32 {

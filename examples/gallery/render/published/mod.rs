@@ -47,7 +47,7 @@ impl Published {
                 numbers.push(material.emits().then_some(triangles.len()));
                 if material.emits() {
                     let [a, b, c] = corners.map(|i| mesh.positions[i as usize]);
-                    let own = Averages::new(model, material, corners.map(|i| mesh.uvs[i as usize]));
+                    let own = Averages::new(model, material, corners.map(|i| mesh.emission_uvs()[i as usize]));
                     let cross = (b - a).cross(c - a);
                     let flux = 0.5 * cross.length() * own.at(&Cell::root([a, b, c]));
                     bounds.push(LightBounds::of_triangle([a, b, c], cross.normalize_or_zero(), flux));
