@@ -71,6 +71,8 @@ pub(crate) enum ErrorKind {
     ProceduralBounds { mesh: usize, region: [[f32; 2]; 2], bounds: [f32; 2] },
     /// What a function gives at a place is not within the bound that it gives over a box around it.
     ProceduralWeight { mesh: usize, uv: [f32; 2], value: f32, region: [[f32; 2]; 2], bounds: [f32; 2] },
+    /// A light without triangles of which a number is NaN, infinite or out of its range.
+    Lamp { light: usize, what: &'static str, value: f32, expected: &'static str },
     /// A handle to a texture that this builder did not give out.
     UnknownTexture { mesh: usize, texture: usize, textures: usize },
     /// A mesh that a sampler does not hold.
@@ -138,6 +140,9 @@ impl fmt::Display for Error {
             } => {
                 write!(f, "mesh {mesh}: the weight at uv ({u}, {v}) is {value}, but its bounds over uv ")?;
                 write!(f, "({u0}, {v0}) to ({u1}, {v1}) are {min} and {max}")
+            }
+            ErrorKind::Lamp { light, what, value, expected } => {
+                write!(f, "light {light}: the {what} is {value}, but must be {expected}")
             }
             ErrorKind::UnknownTexture { mesh, texture, textures } => {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")

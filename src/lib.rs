@@ -157,9 +157,9 @@ pub use env::{Environment, EnvironmentImage, EnvironmentSample, EnvironmentView,
 pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
-pub use light::{Illumination, Mesh, MeshUpdate, Sides, Weight};
+pub use light::{Illumination, Lamp, Mesh, MeshUpdate, Sides, SphereLight, Weight};
 pub use receiver::{Receiver, ShadingPoint};
-pub use record::{Filter, Hit, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
+pub use record::{Filter, Hit, LightId, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
 };

@@ -2,13 +2,13 @@
 //! and nothing else along the ray need be looked for.
 //!
 //! Two arrangements are recognized: lights side by side in one plane, and lights on the surface of one convex body that all
-//! face into it, such as the windows of a room. A ray leaves a convex body once.
+//! face into it, such as the windows of a room. A ray leaves a convex body once. Lamps without an extent are never crossed.
 
 use alloc::vec::Vec;
 
 use glam::DVec3;
 
-use super::{LightKind, LightTriangle, Lights};
+use super::{LampRecord, LightKind, LightTriangle, Lights};
 use crate::math::sqrt64;
 
 /// Most planes that lights may lie in. *Chosen*: a room has six.
@@ -83,7 +83,8 @@ fn extent(light: &LightTriangle) -> f64 {
 impl Lights {
     /// Finds out whether a ray meets at most one light that shines back along it.
     pub(crate) fn find_crossings(&mut self) {
-        self.is_crossed_once = is_crossed_once(&self.triangles);
+        let is_flat = !self.lamps.iter().any(LampRecord::has_extent);
+        self.is_crossed_once = is_flat && is_crossed_once(&self.triangles);
     }
 }
 

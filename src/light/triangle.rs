@@ -1,11 +1,11 @@
 //! A triangle of an emissive mesh or of a portal.
 
-use core::f32::consts::PI;
+use core::f32::consts::{FRAC_PI_2, PI};
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::LightKind;
+use super::{LightKind, LocalPoint};
 use crate::blas::{Lattice, Root};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{self, Aabb, Cone, Triangle};
@@ -42,6 +42,12 @@ impl LightTriangle {
         Triangle(self.vertices.map(Vec3::from))
     }
 
+    /// Returns the triangle's number among all that were added.
+    #[inline]
+    pub(super) fn index(&self) -> u32 {
+        self.index_and_flags & !(Self::TWO_SIDED | Self::PORTAL)
+    }
+
     /// Whether the numbers, which may come from outside, are those of a triangle.
     pub(super) fn is_valid(&self) -> bool {
         let in_range = self.vertices.as_flattened().iter().all(|x| x.abs() <= POSITION_LIMIT);
@@ -56,11 +62,6 @@ impl LightTriangle {
 }
 
 impl LightKind for LightTriangle {
-    #[inline]
-    fn index(&self) -> u32 {
-        self.index_and_flags & !(Self::TWO_SIDED | Self::PORTAL)
-    }
-
     #[inline]
     fn is_portal(&self) -> bool {
         self.index_and_flags & Self::PORTAL != 0
@@ -89,6 +90,7 @@ impl LightKind for LightTriangle {
         let bounds = LightBounds {
             aabb: Aabb::around(&triangle.0),
             normals: Cone::single(normal),
+            emission: FRAC_PI_2,
             flux: if directional { 0.0 } else { energy },
             portal: if directional { energy } else { 0.0 },
             two_sided: self.is_two_sided(),
@@ -112,9 +114,9 @@ impl LightKind for LightTriangle {
     }
 
     #[inline]
-    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<Lattice> {
+    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         let vertices = self.triangle().exactly_relative_to(origin);
-        geometry::intersect(vertices, direction).map(Lattice::from_barycentrics)
+        geometry::intersect(vertices, direction).map(|b| LocalPoint::on_triangle(Lattice::from_barycentrics(b)))
     }
 
     #[inline(always)]

@@ -2,6 +2,7 @@
 
 pub(crate) mod discrete;
 pub(crate) mod equal_area;
+pub(crate) mod spherical_cap;
 mod spherical_triangle;
 pub(crate) mod triangle;
 pub(crate) mod variate;

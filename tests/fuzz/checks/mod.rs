@@ -129,11 +129,11 @@ fn emit(lights: &LightSampler, reader: &mut Reader<'_>) {
     if let Some(ray) = emission.sample(u) {
         assert!(ray.position.is_finite() && (ray.direction.length() - 1.0).abs() < 1e-4, "{ray:?}");
         assert!(ray.pdf > 0.0 && ray.pdf.is_finite() && ray.pmf > 0.0, "{ray:?}");
-        assert_close(emission.pdf(&ray.hit, ray.direction), ray.pdf, &ray);
+        assert_close(emission.pdf(&ray.hit().expect("a triangle"), ray.direction), ray.pdf, &ray);
     }
     assert_density(emission.pdf_ray(reader.vector(), reader.vector()));
     let direction = reader.vector().normalize_or(Vec3::X);
     if let Some(ray) = emission.sample_distant(direction, [u[0], u[1], u[2]]) {
-        assert_close(emission.pdf_distant(direction, &ray.hit), ray.pdf, &ray);
+        assert_close(emission.pdf_distant(direction, &ray.hit().expect("a triangle")), ray.pdf, &ray);
     }
 }
