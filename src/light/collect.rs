@@ -5,9 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
-use super::{
-    Energies, Illumination, LAMP, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF,
-};
+use super::{Energies, Illumination, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
 use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
@@ -217,25 +215,20 @@ impl<'a> LightCollection<'a> {
         let leaf_of = |&index: &u32| leaf_of_index.get(index as usize).copied().unwrap_or(index);
         let lamp_leaves = &leaf_of_index[first_lamp as usize..];
         let leaf_of = self.indices.iter().map(leaf_of).chain(lamp_leaves.iter().copied()).collect();
-        let lamps: Vec<LampRecord> =
-            leaves.iter().filter_map(|index| Some(self.lamps[index.checked_sub(first_lamp)? as usize])).collect();
-        let triangle = |index: u32| self.triangles[index as usize];
-        let (triangles, places) = if lamps.is_empty() {
-            (parallel::collect(leaves.len(), |leaf| triangle(leaves[leaf])), Vec::new())
-        } else {
-            let triangles = leaves.iter().filter(|&&index| index < first_lamp).map(|&index| triangle(index));
-            (triangles.collect(), places(leaves, first_lamp))
+        let record = |leaf: usize| match leaves[leaf].checked_sub(first_lamp) {
+            None => self.triangles[leaves[leaf] as usize],
+            Some(lamp) => self.lamps[lamp as usize].into_triangle(),
         };
+        let records = parallel::collect(leaves.len(), record);
         Lights {
             illumination,
             energy: 0.0,
             has_portals,
+            has_lamps: leaves.iter().any(|&index| index >= first_lamp),
             is_crossed_once: false,
-            triangles,
+            records,
             cells: self.cells,
             leaf_of,
-            lamps,
-            places,
             meshes: self.meshes,
             scales: Vec::new(),
         }
@@ -337,16 +330,4 @@ impl<'a> LightCollection<'a> {
             }
         }
     }
-}
-
-/// Returns where the light of each leaf is among those of its kind. `leaves` are indices of lights, those of lamps from
-/// `first_lamp` on.
-fn places(leaves: &[u32], first_lamp: u32) -> Vec<u32> {
-    let (mut triangles, mut lamps) = (0, LAMP);
-    let place = |&index: &u32| {
-        let next = if index < first_lamp { &mut triangles } else { &mut lamps };
-        *next += 1;
-        *next - 1
-    };
-    leaves.iter().map(place).collect()
 }

@@ -35,6 +35,13 @@ pub(crate) struct EmittedRay {
     pub(crate) pdf: f64,
 }
 
+impl EmittedRay {
+    /// Returns a ray from a light without an extent.
+    pub(super) fn from_point(position: Vec3, direction: Vec3, pdf: f64) -> Self {
+        Self { point: LocalPoint::NONE, position: position.as_dvec3(), normal: direction, direction, pdf }
+    }
+}
+
 impl LightsView<'_> {
     /// Draws a ray in which light leaves a light in all directions; `None` for a light that is switched off. `side` chooses
     /// the side of a light of two sides.

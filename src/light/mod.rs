@@ -28,6 +28,7 @@ use crate::buffers::buffers;
 use crate::env::EnvironmentView;
 use crate::receiver::ShadingPoint;
 use crate::record::{Hit, LightId, MeshId, SampledLight, TriangleId};
+use crate::simd::prefetch;
 use crate::warp::Variate;
 
 pub(crate) use collect::LightCollection;
@@ -36,7 +37,7 @@ pub(crate) use energy::{Energies, storable};
 pub use illumination::Illumination;
 use lamp::LampRecord;
 pub(crate) use lamp::LampView;
-pub use lamp::{Lamp, SphereLight};
+pub use lamp::{DiskLight, Lamp, PointLight, SphereLight, SpotLight, TubeLight};
 pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
@@ -46,8 +47,6 @@ pub(crate) use triangle_view::TriangleView;
 pub(crate) const NO_LEAF: u32 = u32::MAX;
 /// Marks a triangle that is not in the tree because it has no area. *Format.*
 pub(crate) const NO_AREA: u32 = u32::MAX - 1;
-/// Marks a leaf that is a lamp among `places`. *Format.*
-const LAMP: u32 = 1 << 31;
 
 buffers! {
     /// The lights of a scene.
@@ -62,12 +61,14 @@ buffers! {
         energy: f32,
         /// Whether any light is a portal.
         has_portals: bool,
+        /// Whether any light is a lamp.
+        has_lamps: bool,
         /// Whether a ray is known to meet at most one light that shines back along it.
         is_crossed_once: bool,
     }
     buffers {
-        /// Triangles, in the order of their leaves.
-        triangles: LightTriangle = b"TRIA" version 1,
+        /// Triangles, and lamps in records of the same size, in the order of the tree's leaves.
+        records: LightTriangle = b"TRIA" version 1,
         /// Nodes of the trees over textures.
         cells: CellNode = b"CELL" version 2,
         /// Where the triangles of each mesh start in `leaf_of`, and their number at the end.
@@ -76,11 +77,6 @@ buffers! {
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
-        /// Lamps, in the order of their leaves.
-        lamps: LampRecord = b"LAMP" version 1,
-        /// For each leaf its index in `triangles`, or its index in `lamps` and [`LAMP`]. Empty without lamps: then every leaf is
-        /// the triangle of the same number.
-        places: u32 = b"PLAC" version 1,
     }
 }
 
@@ -182,9 +178,6 @@ pub(crate) trait LightKind {
 
     /// Returns the point where a ray crosses the light, if it does. `direction` need not be a unit vector.
     fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint>;
-
-    /// Fetches the light's memory, so that a later look at it does not wait.
-    fn prefetch(&self);
 }
 
 /// What a light of any kind says of itself to a shading point.
@@ -260,11 +253,6 @@ impl LightKind for Light<'_> {
     fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         dispatch!(Light, self, kind => kind.intersect(origin, direction))
     }
-
-    #[inline(always)]
-    fn prefetch(&self) {
-        dispatch!(Light, self, kind => kind.prefetch());
-    }
 }
 
 impl LightViewKind for LightView<'_> {
@@ -315,6 +303,16 @@ impl LightView<'_> {
 }
 
 impl<'a> Light<'a> {
+    /// Returns the light of a record.
+    #[inline(always)]
+    fn of(record: &'a LightTriangle) -> Self {
+        if record.index_and_flags & LightTriangle::LAMP == 0 {
+            Light::Triangle(record)
+        } else {
+            Light::Lamp(bytemuck::cast_ref(record))
+        }
+    }
+
     /// Returns the triangle; `None` for anything else.
     #[inline(always)]
     fn triangle(self) -> Option<&'a LightTriangle> {
@@ -342,7 +340,7 @@ impl LightPoint {
 impl<'a> LightsView<'a> {
     /// Number of lights.
     pub(crate) fn len(&self) -> usize {
-        self.triangles.len() + self.lamps.len()
+        self.records.len()
     }
 
     /// Whether there is no light.
@@ -350,27 +348,16 @@ impl<'a> LightsView<'a> {
         self.len() == 0
     }
 
-    /// Whether any light is something else than a triangle.
-    #[inline(always)]
-    pub(crate) fn has_lamps(&self) -> bool {
-        !self.lamps.is_empty()
-    }
-
     /// Returns the light in a leaf.
     #[inline(always)]
     pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
-        if self.has_lamps() { self.mixed_light(leaf) } else { Light::Triangle(&self.triangles[leaf as usize]) }
+        Light::of(&self.records[leaf as usize])
     }
 
-    /// Returns the light in a leaf of a scene with lamps.
-    #[inline(never)]
-    fn mixed_light(&self, leaf: u32) -> Light<'a> {
-        let place = self.places[leaf as usize];
-        if place & LAMP == 0 {
-            Light::Triangle(&self.triangles[place as usize])
-        } else {
-            Light::Lamp(&self.lamps[(place & !LAMP) as usize])
-        }
+    /// Fetches the memory of the light in a leaf, so that a later look at it does not wait.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, leaf: u32) {
+        prefetch(&self.records[leaf as usize]);
     }
 
     /// Returns a light as seen from a shading point; `None` if nothing can arrive from it. `environment` is what portals
@@ -387,7 +374,7 @@ impl<'a> LightsView<'a> {
     {
         match self.light(leaf) {
             Light::Triangle(light) => {
-                TriangleView::new(light, x, self.illumination, self.cells, environment, LightView::Triangle)
+                TriangleView::wrapped(light, x, self.illumination, self.cells, environment, LightView::Triangle)
             }
             Light::Lamp(lamp) => LampView::new(lamp, x).map(LightView::Lamp),
         }

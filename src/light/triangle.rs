@@ -10,7 +10,6 @@ use crate::blas::{Lattice, Root};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{self, Aabb, Cone, Triangle};
 use crate::receiver::{ReceiverKind, ShadingPoint};
-use crate::simd::prefetch;
 
 /// Largest coordinate of a vertex.
 ///
@@ -25,7 +24,8 @@ pub(crate) struct LightTriangle {
     pub(crate) vertices: [[f32; 3]; 3],
     /// The tree over its texture.
     pub(crate) root: Root,
-    /// Number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`].
+    /// Number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`]. With [`Self::LAMP`], all of
+    /// this is the record of a lamp.
     pub(crate) index_and_flags: u32,
 }
 
@@ -36,6 +36,8 @@ impl LightTriangle {
     pub(crate) const TWO_SIDED: u32 = 1 << 31;
     /// Marks a triangle that shows the environment behind it. *Format.*
     pub(crate) const PORTAL: u32 = 1 << 30;
+    /// Marks the record of a lamp, which is as large as that of a triangle. *Format*: numbers of lights stay below it.
+    pub(crate) const LAMP: u32 = 1 << 29;
 
     #[inline]
     pub(crate) fn triangle(&self) -> Triangle {
@@ -117,10 +119,5 @@ impl LightKind for LightTriangle {
     fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         let vertices = self.triangle().exactly_relative_to(origin);
         geometry::intersect(vertices, direction).map(|b| LocalPoint::on_triangle(Lattice::from_barycentrics(b)))
-    }
-
-    #[inline(always)]
-    fn prefetch(&self) {
-        prefetch(self);
     }
 }

@@ -77,7 +77,7 @@ impl<'a> TriangleView<'a> {
     /// Returns the view from a shading point, or `None` where nothing can arrive. `wrap` makes the view into what is wanted
     /// before it is written anywhere: a view is large.
     #[inline]
-    pub(super) fn new<V>(
+    pub(super) fn wrapped<V>(
         light: &LightTriangle,
         x: &ShadingPoint,
         illumination: Illumination,

@@ -21,12 +21,6 @@ impl Lights {
         self.meshes[mesh] as usize..self.meshes[mesh + 1] as usize
     }
 
-    /// Where the triangle in a leaf is in `triangles`; `None` for one that is not in the tree.
-    fn triangle_at(&self, leaf: u32) -> Option<usize> {
-        let place = if self.lamps.is_empty() { leaf } else { self.places.get(leaf as usize).copied()? };
-        Some(place as usize).filter(|&place| place < self.triangles.len())
-    }
-
     fn check(&self, update: &MeshUpdate<'_>) -> Result<(), Error> {
         let (mesh, meshes) = (update.mesh.0 as usize, self.meshes.len() - 1);
         if mesh >= meshes {
@@ -46,7 +40,7 @@ impl Lights {
             }
         }
         let Some(scale) = update.scale else { return Ok(()) };
-        let average = |&leaf: &u32| self.triangle_at(leaf).map_or(0.0, |i| self.triangles[i].root.average);
+        let average = |leaf: &u32| self.records.get(*leaf as usize).map_or(0.0, |light| light.root.average);
         let brightest = leaves.iter().map(average).fold(1.0, f32::max);
         match [scale, scale * brightest].into_iter().find(|value| !(0.0..=blas::MAX_AVERAGE).contains(value)) {
             Some(value) => Err(Error(ErrorKind::Weight { mesh, value, limit: blas::MAX_AVERAGE })),
@@ -58,9 +52,9 @@ impl Lights {
         let mesh = update.mesh.0 as usize;
         let range = self.range(mesh);
         if let Some((positions, indices)) = update.triangles {
-            for (i, &indices) in range.zip(indices) {
-                if let Some(at) = self.triangle_at(self.leaf_of[i]) {
-                    self.triangles[at].vertices = triangle(positions, indices).0.map(Vec3::into);
+            for (&leaf, &indices) in self.leaf_of[range].iter().zip(indices) {
+                if let Some(light) = self.records.get_mut(leaf as usize) {
+                    light.vertices = triangle(positions, indices).0.map(Vec3::into);
                 }
             }
         }

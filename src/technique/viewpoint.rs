@@ -86,7 +86,7 @@ impl LeafOracle for Viewpoint<'_> {
 
     #[inline(always)]
     fn has_shaped_leaves(&self) -> bool {
-        self.scene.lights.has_lamps()
+        self.scene.lights.has_lamps
     }
 
     #[inline]

@@ -11,8 +11,8 @@ use crate::common::scene::{Content, Scene};
 use crate::common::statistics::{Mean, chi_square, sidak};
 use crate::common::tier::tier;
 use fanlight::{
-    Arity, Emission, Error, Lamp, LightId, LightSample, LightSampler, LightSamplerView, Mesh, PointSampler, Receiver,
-    SampledLight, ShadingPoint, Sides, SphereLight, Splitting, Weight,
+    DiskLight, Emission, Error, Lamp, LightId, LightSample, LightSampler, LightSamplerView, Mesh, PointLight,
+    PointSampler, Receiver, SampledLight, ShadingPoint, Sides, SphereLight, Splitting, SpotLight, TubeLight, Weight,
 };
 use glam::{DVec3, Vec3};
 
@@ -23,13 +23,17 @@ const TOLERANCE: f64 = 1e-5;
 
 /// A lamp, and what it sends to a point, by other means than those of the crate.
 #[derive(Clone, Copy, Debug)]
-enum Twin {
+pub(crate) enum Twin {
     Sphere { center: DVec3, radius: f64, two_sided: bool },
+    Point { position: DVec3 },
+    Spot { position: DVec3, axis: DVec3, angles: [f64; 2] },
+    Disk { center: DVec3, normal: DVec3, radius: f64, two_sided: bool },
+    Tube { ends: [DVec3; 2], radius: f64 },
 }
 
 /// A lamp together with its twin, of radiance or intensity 1.
 #[derive(Clone, Copy, Debug)]
-struct Kind {
+pub(crate) struct Kind {
     lamp: Lamp,
     twin: Twin,
 }
@@ -44,7 +48,39 @@ fn hollow_sphere(center: Vec3, radius: f32) -> Kind {
     Kind { lamp: SphereLight::new(center, radius, 1.0).sides(Sides::Two).into(), twin }
 }
 
+fn point(position: Vec3) -> Kind {
+    Kind { lamp: PointLight::new(position, 1.0).into(), twin: Twin::Point { position: position.as_dvec3() } }
+}
+
+fn spot(position: Vec3, axis: Vec3, angles: [f32; 2]) -> Kind {
+    let twin =
+        Twin::Spot { position: position.as_dvec3(), axis: axis.as_dvec3().normalize(), angles: angles.map(f64::from) };
+    Kind { lamp: SpotLight::new(position, axis, 1.0, angles).into(), twin }
+}
+
+fn disk(center: Vec3, normal: Vec3, radius: f32, sides: Sides) -> Kind {
+    let twin = Twin::Disk {
+        center: center.as_dvec3(),
+        normal: normal.as_dvec3().normalize(),
+        radius: radius.into(),
+        two_sided: sides == Sides::Two,
+    };
+    Kind { lamp: DiskLight::new(center, normal, radius, 1.0).sides(sides).into(), twin }
+}
+
+fn tube(ends: [Vec3; 2], radius: f32) -> Kind {
+    let twin = Twin::Tube { ends: ends.map(|end| end.as_dvec3()), radius: radius.into() };
+    Kind { lamp: TubeLight::new(ends, radius, 1.0).into(), twin }
+}
+
 impl Twin {
+    /// Share of the intensity that leaves in a unit direction; 1 for what has an extent.
+    fn falloff(&self, direction: DVec3) -> f64 {
+        let Self::Spot { axis, angles: [inner, outer], .. } = self else { return 1.0 };
+        let t = ((axis.dot(direction) - outer.cos()) / (inner.cos() - outer.cos())).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    }
+
     /// Radiance that arrives along a unit direction; nothing of what has no extent.
     fn radiance(&self, origin: DVec3, direction: DVec3) -> f64 {
         match *self {
@@ -54,21 +90,86 @@ impl Twin {
                 let is_hit = to.dot(direction) > 0.0 && to.reject_from(direction).length() <= radius;
                 f64::from(u8::from(if is_inside { two_sided } else { is_hit }))
             }
+            Self::Point { .. } | Self::Spot { .. } => 0.0,
+            Self::Disk { center, normal, radius, two_sided } => {
+                let height = (center - origin).dot(normal);
+                let distance = height / direction.dot(normal);
+                let is_hit = distance > 0.0 && (origin + distance * direction - center).length() <= radius;
+                f64::from(u8::from(is_hit && (height < 0.0 || two_sided)))
+            }
+            Self::Tube { ends: [start, end], radius } => {
+                // The first of both points of an endless cylinder, if the origin is outside of it.
+                let axis = (end - start).normalize();
+                let (across, from) = (direction.reject_from(axis), (origin - start).reject_from(axis));
+                let (a, b, c) = (across.length_squared(), across.dot(from), from.length_squared() - radius * radius);
+                let root = (b * b - a * c).sqrt();
+                let height = (origin - start + (-b - root) / a * direction).dot(axis);
+                let is_hit = c > 0.0 && b < 0.0 && height >= 0.0 && height <= (end - start).length();
+                f64::from(u8::from(is_hit))
+            }
         }
     }
 
-    /// Cone of directions that holds all of the light: unit axis and cosine of the half angle.
+    /// Cone of directions that holds all of a sphere: unit axis and cosine of the half angle.
     fn cone(&self, origin: DVec3) -> (DVec3, f64) {
         match *self {
             Self::Sphere { center, radius, .. } => ball(center - origin, radius),
+            _ => (DVec3::Z, -1.0),
         }
     }
 
     /// Irradiance of what has no extent; of anything else by an integral over directions.
     fn irradiance(&self, x: &ShadingPoint, steps: usize) -> f64 {
         let origin = x.position.as_dvec3();
-        let (axis, cos) = self.cone(origin);
-        over_cap(axis, cos, steps, |direction| weight(x, direction) * self.radiance(origin, direction))
+        if let Self::Point { position } | Self::Spot { position, .. } = self {
+            let direction = (*position - origin).normalize();
+            return weight(x, direction) * self.falloff(-direction) / (*position - origin).length_squared();
+        }
+        self.integrate(origin, steps, |direction| weight(x, direction))
+    }
+
+    /// Integral over the directions from a point that the light sends to it in, by the midpoints of equal parts.
+    fn integrate(&self, origin: DVec3, steps: usize, f: impl Fn(DVec3) -> f64) -> f64 {
+        let middle = |i: usize| (i as f64 + 0.5) / steps as f64;
+        // Points of a surface, with normals and areas.
+        let surface = |point: &dyn Fn(f64, f64) -> (DVec3, DVec3, f64), two_sided: bool| {
+            let mut sum = 0.0;
+            for k in 0..steps * steps {
+                let (position, normal, area) = point(middle(k % steps), middle(k / steps));
+                let to = position - origin;
+                let cosine = -normal.dot(to) / to.length();
+                let cosine = if two_sided { cosine.abs() } else { cosine.max(0.0) };
+                if cosine > 0.0 {
+                    sum += f(to.normalize()) * cosine * area / to.length_squared();
+                }
+            }
+            sum / (steps * steps) as f64
+        };
+        match *self {
+            Self::Point { .. } | Self::Spot { .. } => 0.0,
+            Self::Sphere { .. } => {
+                let (axis, cos) = self.cone(origin);
+                over_cap(axis, cos, steps, |direction| self.radiance(origin, direction) * f(direction))
+            }
+            Self::Disk { center, normal, radius, two_sided } => {
+                let (s, t) = normal.any_orthonormal_pair();
+                let point = |u: f64, v: f64| {
+                    let (sin, cos) = (TAU * v).sin_cos();
+                    (center + radius * u.sqrt() * (s * cos + t * sin), normal, PI * radius * radius)
+                };
+                surface(&point, two_sided)
+            }
+            Self::Tube { ends: [a, b], radius } => {
+                let (s, t) = (b - a).normalize().any_orthonormal_pair();
+                let point = |u: f64, v: f64| {
+                    let (sin, cos) = (TAU * v).sin_cos();
+                    let normal = s * cos + t * sin;
+                    (a.lerp(b, u) + radius * normal, normal, TAU * radius * (b - a).length())
+                };
+                let is_inside = (origin - a).reject_from((b - a).normalize()).length() <= radius;
+                if is_inside { 0.0 } else { surface(&point, false) }
+            }
+        }
     }
 }
 
@@ -110,7 +211,19 @@ fn receivers(pcg: &mut Pcg32) -> [Receiver; 3] {
 /// Lamps of all kinds around the unit cube.
 fn kinds(pcg: &mut Pcg32) -> Vec<Kind> {
     let mut place = || Vec3::from_array(pcg.cube());
-    vec![sphere(place(), 0.3), sphere(place(), 0.01), sphere(place(), 0.7), hollow_sphere(place(), 0.4)]
+    vec![
+        sphere(place(), 0.3),
+        sphere(place(), 0.01),
+        sphere(place(), 0.7),
+        hollow_sphere(place(), 0.4),
+        point(place()),
+        spot(place(), place() - place(), [0.3, 0.7]),
+        spot(place(), place() - place(), [0.2, 1.5]),
+        disk(place(), place() - place(), 0.4, Sides::One),
+        disk(place(), place() - place(), 0.1, Sides::Two),
+        tube([place(), place()], 0.1),
+        tube([place(), place()], 0.02),
+    ]
 }
 
 fn build(lamps: &[Kind]) -> LightSampler {
@@ -122,7 +235,7 @@ fn build(lamps: &[Kind]) -> LightSampler {
 }
 
 /// Lamps among the meshes of a random scene.
-fn mixed(pcg: &mut Pcg32, number: usize) -> (LightSampler, Vec<Kind>) {
+pub(crate) fn mixed(pcg: &mut Pcg32, number: usize) -> (LightSampler, Vec<Kind>) {
     let content =
         Content { triangles: [1, 10, 100][number % 3], textured: number % 2 == 0, sky: number % 5, two_sided: true };
     let scene = Scene::random(pcg, content);
@@ -136,7 +249,7 @@ fn mixed(pcg: &mut Pcg32, number: usize) -> (LightSampler, Vec<Kind>) {
 }
 
 /// Density of the light of a sample, asked for by its id.
-fn pdf_again(at: &PointSampler<'_>, sample: &LightSample) -> f32 {
+pub(crate) fn pdf_again(at: &PointSampler<'_>, sample: &LightSample) -> f32 {
     match sample.light {
         SampledLight::Triangle(hit) => at.pdf(&hit),
         SampledLight::Environment => at.pdf_environment(sample.direction),
@@ -157,7 +270,10 @@ fn brought(twins: &[Kind], x: &ShadingPoint, sample: &LightSample) -> f64 {
     let received = weight(x, direction);
     match sample.light {
         SampledLight::Shape(_) => received / f64::from(sample.pdf),
-        SampledLight::Punctual(_) => received / (f64::from(sample.distance).powi(2) * f64::from(sample.pdf)),
+        SampledLight::Punctual(id) => {
+            let falloff = twins[id.index() as usize].twin.falloff(-direction);
+            falloff * received / (f64::from(sample.distance).powi(2) * f64::from(sample.pdf))
+        }
         _ => 0.0,
     }
 }
@@ -181,7 +297,7 @@ fn each_kind_brings_the_irradiance_of_an_integral() {
                         [pcg.f32(), ((i % n) as f32 + pcg.f32()) / n as f32, ((i / n) as f32 + pcg.f32()) / n as f32];
                     mean.add(at.sample(u).map_or(0.0, |sample| brought(&[kind], &x, &sample)));
                 }
-                results.push((kind, x, kind.twin.irradiance(&x, 400), mean.mean(), mean.error()));
+                results.push((kind, x, kind.twin.irradiance(&x, 500), mean.mean(), mean.error()));
             }
         }
         results
@@ -206,8 +322,8 @@ fn densities_of_directions_integrate_to_the_rate_of_samples() {
                 let x = ShadingPoint::new(3.0 * Vec3::from_array(pcg.cube()) - 1.0, receiver);
                 let lights = build(&[kind]);
                 let at = lights.at(&x);
-                let (axis, cos) = kind.twin.cone(x.position.as_dvec3());
-                let integral = over_cap(axis, cos, 300, |direction| at.pdf_direction(direction.as_vec3()).into());
+                let pdf = |direction: DVec3| f64::from(at.pdf_direction(direction.as_vec3()));
+                let integral = kind.twin.integrate(x.position.as_dvec3(), 300, pdf);
                 let n = 20_000;
                 let drawn = (0..n).filter(|_| at.sample(pcg.cube()).is_some_and(|sample| sample.has_extent())).count();
                 results.push((kind, x, integral, drawn as f64 / f64::from(n)));
@@ -397,7 +513,7 @@ fn photons_carry_the_power_of_their_lamps() {
                 assert_close(emission.pdf_light(LightId::from_index(0), ray.direction), ray.pdf, &ray);
                 let landed = ray.position + 10.0 * ray.direction;
                 assert!(emission.pdf_sample_ray(&ray, landed) >= ray.pdf);
-                1.0 / f64::from(ray.pdf)
+                kind.twin.falloff(ray.direction.as_dvec3()) / f64::from(ray.pdf)
             });
             mean.add(power);
         }
@@ -413,6 +529,13 @@ fn power(twin: &Twin) -> f64 {
             let sides = if two_sided { 2.0 } else { 1.0 };
             sides * PI * 4.0 * PI * radius * radius
         }
+        Twin::Point { .. } => 4.0 * PI,
+        Twin::Spot { axis, angles, .. } => over_cap(axis, angles[1].cos(), 300, |direction| twin.falloff(direction)),
+        Twin::Disk { radius, two_sided, .. } => {
+            let sides = if two_sided { 2.0 } else { 1.0 };
+            sides * PI * PI * radius * radius
+        }
+        Twin::Tube { ends: [a, b], radius } => PI * TAU * radius * (b - a).length(),
     }
 }
 
@@ -441,7 +564,10 @@ fn photons_bring_what_light_samples_bring() {
     for _ in 0..400_000 {
         let ray = emission.sample(core::array::from_fn(|_| pcg.f32()));
         photons.add(ray.map_or(0.0, |ray| match landing(ray.position, ray.direction) {
-            Some(_) => 1.0 / f64::from(ray.pdf),
+            Some(_) => {
+                let twin = ray.light.id().map(|id| lamps[id.index() as usize].twin);
+                twin.map_or(1.0, |twin| twin.falloff(ray.direction.as_dvec3())) / f64::from(ray.pdf)
+            }
             None => 0.0,
         }));
         let position = Vec3::new(2.0 * pcg.f32() - 1.0, 2.0 * pcg.f32() - 1.0, height);
@@ -480,6 +606,22 @@ fn bad_lamps_are_clear_errors() {
     refuse(SphereLight::new(Vec3::new(0.0, f32::NAN, 0.0), 1.0, 1.0).into(), &["center", "NaN"]);
     refuse(SphereLight::new(Vec3::new(0.0, 0.0, -1e9), 1e6, 1.0).into(), &["center", "1e9"]);
     refuse(SphereLight::new(Vec3::ZERO, 1.0, 2e30).into(), &["radiance", "1e30"]);
+    for (value, name) in bad {
+        refuse(PointLight::new(Vec3::ZERO, value).into(), &["intensity", name]);
+        refuse(SpotLight::new(Vec3::ZERO, Vec3::Z, value, [0.1, 0.2]).into(), &["intensity", name]);
+        refuse(SpotLight::new(Vec3::ZERO, Vec3::Z, 1.0, [0.1, value]).into(), &["outer angle", name]);
+        refuse(SpotLight::new(Vec3::ZERO, Vec3::Z, 1.0, [value, 0.2]).into(), &["inner angle", name]);
+        refuse(DiskLight::new(Vec3::ZERO, Vec3::Z, value, 1.0).into(), &["radius", name]);
+        refuse(DiskLight::new(Vec3::ZERO, Vec3::Z, 1.0, value).into(), &["radiance", name]);
+        refuse(TubeLight::new([Vec3::ZERO, Vec3::Z], value, 1.0).into(), &["radius", name]);
+        refuse(TubeLight::new([Vec3::ZERO, Vec3::Z], 1.0, value).into(), &["radiance", name]);
+    }
+    refuse(PointLight::new(Vec3::new(2e9, 0.0, 0.0), 1.0).into(), &["position", "2000000000"]);
+    refuse(SpotLight::new(Vec3::ZERO, Vec3::ZERO, 1.0, [0.1, 0.2]).into(), &["axis", "0"]);
+    refuse(SpotLight::new(Vec3::ZERO, Vec3::Z, 1.0, [0.3, 0.2]).into(), &["inner angle", "outer angle"]);
+    refuse(SpotLight::new(Vec3::ZERO, Vec3::Z, 1.0, [0.3, 1.6]).into(), &["outer angle", "π/2"]);
+    refuse(DiskLight::new(Vec3::ZERO, Vec3::splat(f32::NAN), 1.0, 1.0).into(), &["normal"]);
+    refuse(TubeLight::new([Vec3::X, Vec3::X], 1.0, 1.0).into(), &["length", "0"]);
 }
 
 /// Lamps of every size, seen from every distance: nothing is NaN or infinite, densities agree, and nothing arrives from
@@ -518,7 +660,20 @@ fn hostile_places_are_safe() {
 
 /// Lamps of all kinds in a place and of a size.
 fn shapes(place: Vec3, size: f32) -> Vec<Kind> {
-    vec![sphere(place, size), hollow_sphere(place, size)]
+    let ends = [place - 0.5 * size * Vec3::X, place + 0.5 * size * Vec3::X];
+    let mut kinds = vec![
+        sphere(place, size),
+        hollow_sphere(place, size),
+        point(place),
+        spot(place, Vec3::Z, [0.1, 0.3]),
+        disk(place, Vec3::Z, size, Sides::One),
+        disk(place, Vec3::new(1.0, 2.0, 3.0), size, Sides::Two),
+    ];
+    // So far from the origin, the ends of a short tube are the same.
+    if ends[0] != ends[1] {
+        kinds.extend([tube(ends, (0.5 * size).max(1e-15)), tube(ends, (1e-5 * size).max(1e-15))]);
+    }
+    kinds
 }
 
 fn check_hostile(lights: &LightSampler, x: &ShadingPoint, pcg: &mut Pcg32) -> usize {
@@ -606,5 +761,12 @@ fn variance_changes_gradually_with_the_size_of_a_light() {
     assert_gradual("radius of a sphere", |radius| with(vec![sphere(center, radius)]), [1e-4, 10.0]);
     let row = |radius: f32| (0..20u8).map(|i| sphere(Vec3::new(f32::from(i) - 8.0, 2.0, 1.0), radius)).collect();
     assert_gradual("radius of twenty spheres", |radius| with(row(radius)), [1e-4, 0.9]);
+    let x = |height: f32| Vec3::new(0.2, 0.1, height);
+    assert_gradual("radius of a disk", |radius| with(vec![disk(x(1.0), Vec3::NEG_Z, radius, Sides::One)]), [1e-4, 1e3]);
+    assert_gradual("height of a disk", |height| with(vec![disk(x(height), Vec3::NEG_Z, 1.0, Sides::One)]), [1e-4, 1e3]);
+    let ends = |height: f32| [x(height) - Vec3::X, x(height) + Vec3::X];
+    assert_gradual("radius of a tube", |radius| with(vec![tube(ends(1.0), radius)]), [1e-5, 0.9]);
+    assert_gradual("angle of a spot", |angle| with(vec![spot(x(2.0), Vec3::NEG_Z, [0.0, angle])]), [0.15, 1.57]);
+    assert_gradual("distance of a point", |height| with(vec![point(x(height))]), [1e-3, 1e3]);
     assert_gradual("height over a sphere", |gap| with(vec![sphere((0.1 + gap) * Vec3::Z, 0.1)]), [1e-4, 1e3]);
 }

@@ -4,13 +4,19 @@
 //! that a point of a lamp *is* the direction to it. Directions are rounded to single precision when they are drawn, and
 //! every density is that of the rounded direction.
 
+mod disk;
+mod point;
 mod sphere;
+mod spot;
+mod tube;
+
+use core::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 use super::emitted::EmittedRay;
-use super::{DrawnPoint, LightKind, LightViewKind, LocalPoint, POSITION_LIMIT};
+use super::{DrawnPoint, LightKind, LightTriangle, LightViewKind, LocalPoint, POSITION_LIMIT};
 use crate::blas;
 use crate::bounds::{LightBounds, Moments};
 use crate::error::{Error, ErrorKind};
@@ -18,12 +24,18 @@ use crate::geometry::{Aabb, Cone, HORIZON_ROUNDING};
 use crate::math;
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::record::{LightId, SampledLight};
-use crate::simd::prefetch;
 use crate::warp::Variate;
 use crate::warp::spherical_cap::SphericalCap;
 
+pub use disk::DiskLight;
+use disk::DiskView;
+pub use point::PointLight;
+use point::PointView;
 pub use sphere::SphereLight;
 use sphere::SphereView;
+pub use spot::SpotLight;
+pub use tube::TubeLight;
+use tube::TubeView;
 
 /// Numbers that describe a lamp of any kind. *Format*: what the kind with the most numbers needs.
 const VALUES: usize = 10;
@@ -58,21 +70,32 @@ const LEAST_LENGTH: f32 = 1e-15;
 pub enum Lamp {
     /// A sphere.
     Sphere(SphereLight),
+    /// A point without an extent.
+    Point(PointLight),
+    /// A point without an extent that sends into a cone.
+    Spot(SpotLight),
+    /// A flat disk.
+    Disk(DiskLight),
+    /// The round surface of a cylinder.
+    Tube(TubeLight),
 }
 
-/// What is kept of every lamp that can emit light.
+/// What is kept of every lamp that can emit light: in the same array as triangles, and as large as they are.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(crate) struct LampRecord {
-    /// Code of the kind.
-    kind: u32,
-    /// Number among all lamps that were added.
-    pub(super) number: u32,
     /// What the kind makes of them.
     values: [f32; VALUES],
+    /// Code of the kind.
+    kind: u32,
+    /// Number among all lamps that were added, and [`LightTriangle::LAMP`].
+    number_and_mark: u32,
 }
 
-const _: () = assert!(size_of::<LampRecord>() == 48);
+const _: () = assert!(size_of::<LampRecord>() == size_of::<LightTriangle>());
+const _: () = assert!(
+    core::mem::offset_of!(LampRecord, number_and_mark) == core::mem::offset_of!(LightTriangle, index_and_flags)
+);
 
 /// A number that a lamp must not have.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -170,6 +193,9 @@ trait ShapeViewKind {
 #[derive(Clone, Copy, Debug)]
 enum ShapeView {
     Sphere(SphereView),
+    Point(PointView),
+    Disk(DiskView),
+    Tube(TubeView),
 }
 
 /// A lamp as seen from a shading point.
@@ -184,6 +210,10 @@ macro_rules! of_lamp {
     ($lamp:expr, $kind:ident => $call:expr) => {
         match $lamp {
             Lamp::Sphere($kind) => $call,
+            Lamp::Point($kind) => $call,
+            Lamp::Spot($kind) => $call,
+            Lamp::Disk($kind) => $call,
+            Lamp::Tube($kind) => $call,
         }
     };
 }
@@ -193,6 +223,9 @@ macro_rules! of_view {
     ($view:expr, $kind:ident => $call:expr) => {
         match $view {
             ShapeView::Sphere($kind) => $call,
+            ShapeView::Point($kind) => $call,
+            ShapeView::Disk($kind) => $call,
+            ShapeView::Tube($kind) => $call,
         }
     };
 }
@@ -210,7 +243,7 @@ impl Lamp {
             })?;
             (code_of(&kind), kind.to_values())
         });
-        Ok(LampRecord { kind, number, values })
+        Ok(LampRecord { values, kind, number_and_mark: number | LightTriangle::LAMP })
     }
 }
 
@@ -224,6 +257,10 @@ impl LampRecord {
     fn decode(&self) -> Option<Lamp> {
         Some(match self.kind {
             SphereLight::CODE => Lamp::Sphere(SphereLight::from_values(self.values)),
+            PointLight::CODE => Lamp::Point(PointLight::from_values(self.values)),
+            SpotLight::CODE => Lamp::Spot(SpotLight::from_values(self.values)),
+            DiskLight::CODE => Lamp::Disk(DiskLight::from_values(self.values)),
+            TubeLight::CODE => Lamp::Tube(TubeLight::from_values(self.values)),
             _ => return None,
         })
     }
@@ -231,6 +268,16 @@ impl LampRecord {
     /// Returns the lamp. Records are checked before anything is asked of them.
     fn lamp(&self) -> Lamp {
         self.decode().unwrap_or(Lamp::Sphere(SphereLight::new(Vec3::ZERO, 0.0, 0.0)))
+    }
+
+    /// Returns the lamp's number among all that were added.
+    pub(super) fn number(&self) -> u32 {
+        self.number_and_mark & !LightTriangle::LAMP
+    }
+
+    /// Returns the record as it is kept among triangles.
+    pub(super) fn into_triangle(self) -> LightTriangle {
+        bytemuck::cast(self)
     }
 
     /// Whether the numbers, which may come from outside, are those of a lamp that emits.
@@ -245,7 +292,7 @@ impl LampRecord {
 
     /// Returns what a host gets to know of a sample of this lamp.
     pub(super) fn sampled(&self) -> SampledLight {
-        let id = LightId(self.number);
+        let id = LightId(self.number());
         if self.has_extent() { SampledLight::Shape(id) } else { SampledLight::Punctual(id) }
     }
 
@@ -300,11 +347,6 @@ impl LightKind for LampRecord {
         let unit = direction.as_dvec3().try_normalize()?;
         let is_crossed = of_lamp!(self.lamp(), kind => kind.is_crossed(origin, unit));
         is_crossed.then(|| LocalPoint::from_direction(unit.as_vec3()))
-    }
-
-    #[inline(always)]
-    fn prefetch(&self) {
-        prefetch(self);
     }
 }
 
@@ -379,12 +421,25 @@ impl LightViewKind for LampView {
 
 /// Estimates the irradiance from a cap of unit radiance. Zero only if nothing can arrive.
 fn irradiance_of_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
-    let (axis, sin) = (cap.axis.as_vec3(), if cap.cos > 0.0 { cap.sin as f32 } else { 1.0 });
-    let mean = f64::from(receiver.mean_over_cone(axis, sin));
-    // The mean cosine of a cap that the horizon does not cut. Nothing near has more than half of the sphere above it.
-    let is_weighted = receiver.normal() != Vec3::ZERO;
-    let share = if is_weighted { 0.5 * (1.0 + cap.cos.max(0.0)) } else { 1.0 };
-    cap.solid_angle() * share * mean
+    let sin = if cap.cos > 0.0 { cap.sin } else { 1.0 };
+    irradiance_of_directions(receiver, cap.axis, sin, cap.solid_angle())
+}
+
+/// Estimates the irradiance from directions of unit radiance: their middle, the sine of the angle from there to the farthest
+/// of them, and their solid angle. Zero only if nothing can arrive.
+fn irradiance_of_directions(receiver: Receiver, axis: DVec3, sin_reach: f64, solid_angle: f64) -> f64 {
+    // An angle of zero has no mean.
+    let sin = (sin_reach as f32).max(f32::MIN_POSITIVE);
+    let mean = f64::from(receiver.mean_over_cone(axis.as_vec3(), sin));
+    // One plus the cosine of the half angle of a cap, halved: of a cap above the horizon, the mean cosine is that of its
+    // middle times this.
+    let share = if receiver.normal() == Vec3::ZERO { 1.0 } else { (1.0 - solid_angle / (4.0 * PI)).max(0.5) };
+    solid_angle * share * mean
+}
+
+/// `Ok` if a vector has the length 1, which it has unless it had no direction.
+fn check_axis(what: &'static str, axis: Vec3) -> Result<(), Fault> {
+    within(what, axis.length(), [0.999, 1.001], "positive and finite")
 }
 
 /// `Ok` if a number is in a range.

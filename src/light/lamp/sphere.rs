@@ -166,7 +166,8 @@ impl ShapeViewKind for SphereView {
     }
 
     fn normal(&self, point: DVec3) -> DVec3 {
-        (point - self.center).normalize_or_zero()
+        // Of a sphere that is smaller than rounding, any normal that faces the point.
+        (point - self.center).normalize_or(-point.normalize_or_zero())
     }
 
     fn highest(&self, normal: DVec3) -> [f64; 2] {

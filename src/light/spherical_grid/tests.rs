@@ -86,7 +86,7 @@ fn a_samples_density_is_that_of_its_point() {
         let environment = sky.as_ref().map(Environment::as_view);
         for (light, x) in scenes(&mut pcg, 250) {
             let Some(view) =
-                TriangleView::new(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v)
+                TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v)
             else {
                 continue;
             };
@@ -108,7 +108,7 @@ fn densities_are_normalized_and_positive_where_light_is() {
         let environment = sky.as_ref().map(Environment::as_view);
         for (light, x) in scenes(&mut pcg, 30) {
             let Some(view) =
-                TriangleView::new(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v)
+                TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v)
             else {
                 continue;
             };
@@ -151,7 +151,8 @@ fn samples_follow_the_density() {
     for sky in skies() {
         let environment = sky.as_ref().map(Environment::as_view);
         for (light, x) in scenes(&mut pcg, 6) {
-            let view = TriangleView::new(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
+            let view =
+                TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
             let Some(view) = view.filter(TriangleView::prefers_directions) else { continue };
             let Some(grid) = SphericalGrid::new(&view) else { continue };
             let mut expected = [0.0; 2 * BINS * BINS];
@@ -238,7 +239,7 @@ fn near_squares_have_the_right_mean_and_little_noise() {
                 let (mut mean, mut second) = (0.0, 0.0);
                 let count = 3000;
                 for light in &triangles {
-                    let view = TriangleView::new(light, &at, Illumination::default(), NO_CELLS, None, |v| v);
+                    let view = TriangleView::wrapped(light, &at, Illumination::default(), NO_CELLS, None, |v| v);
                     let Some(view) = view else { continue };
                     let (mut sum, mut squares) = (0.0, 0.0);
                     for _ in 0..count {
@@ -271,7 +272,8 @@ fn drawn_directions_lie_in_their_cells() {
     for sky in skies() {
         let environment = sky.as_ref().map(Environment::as_view);
         for (light, x) in scenes(&mut pcg, 50) {
-            let view = TriangleView::new(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
+            let view =
+                TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
             let Some(grid) = view.as_ref().and_then(SphericalGrid::new) else { continue };
             for _ in 0..100 {
                 let Some((direction, cell, _)) = grid.draw(numbers(&mut pcg)) else { continue };
