@@ -81,6 +81,10 @@ pub(crate) enum ErrorKind {
     TriangleCount { mesh: usize, found: usize, expected: usize },
     /// A triangle that is not in the tree, for it had no area, but would have to be.
     Revived { mesh: usize, triangle: usize },
+    /// A light without triangles that a sampler does not hold.
+    UnknownLight { light: usize, lights: usize },
+    /// A light without triangles that is not in the tree, for it emitted nothing, but would have to be.
+    RevivedLight { light: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -155,6 +159,12 @@ impl fmt::Display for Error {
             }
             ErrorKind::Revived { mesh, triangle } => {
                 write!(f, "mesh {mesh}: triangle {triangle} has an area now, but had none when the sampler was built")
+            }
+            ErrorKind::UnknownLight { light, lights } => {
+                write!(f, "light {light} was never added, this sampler has {lights}")
+            }
+            ErrorKind::RevivedLight { light } => {
+                write!(f, "light {light} emits now, but emitted nothing when the sampler was built")
             }
             ErrorKind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             ErrorKind::Cancelled => write!(f, "the build was cancelled"),

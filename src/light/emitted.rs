@@ -53,7 +53,7 @@ impl LightsView<'_> {
         side: f64,
     ) -> Option<EmittedRay> {
         if let Light::Lamp(lamp) = self.light(leaf) {
-            return Some(lamp.emit(point, direction, side));
+            return (lamp.weight() > 0.0).then(|| lamp.emit(point, direction, side));
         }
         let EmissionStart { point, position, normal, two_sided, pdf_area } = self.sample_start(leaf, point)?;
         let pdf = pdf_area * per_direction(two_sided);
@@ -64,7 +64,7 @@ impl LightsView<'_> {
     /// Returns the density with which [`Self::emit`] draws the ray from a given point of a light in a unit direction.
     pub(crate) fn emission_pdf(&self, LightPoint { leaf, point }: LightPoint, direction: Vec3) -> f64 {
         if let Light::Lamp(lamp) = self.light(leaf) {
-            return lamp.emission_pdf(direction);
+            return if lamp.weight() > 0.0 { lamp.emission_pdf(direction) } else { 0.0 };
         }
         let Some(start) = self.start_at(leaf, point) else { return 0.0 };
         if !start.two_sided && start.normal.dot(direction) <= 0.0 {

@@ -11,8 +11,9 @@ use crate::common::scene::{Content, Scene};
 use crate::common::statistics::{Mean, chi_square, sidak};
 use crate::common::tier::tier;
 use fanlight::{
-    DiskLight, Emission, Error, Lamp, LightId, LightSample, LightSampler, LightSamplerView, Mesh, PointLight,
-    PointSampler, Receiver, SampledLight, ShadingPoint, Sides, SphereLight, Splitting, SpotLight, TubeLight, Weight,
+    DiskLight, Emission, Error, Lamp, LightId, LightSample, LightSampler, LightSamplerView, Mesh, MeshId, MeshUpdate,
+    PointLight, PointSampler, Receiver, SampledLight, ShadingPoint, Sides, SphereLight, Splitting, SpotLight,
+    TubeLight, Weight,
 };
 use glam::{DVec3, Vec3};
 
@@ -769,4 +770,63 @@ fn variance_changes_gradually_with_the_size_of_a_light() {
     assert_gradual("angle of a spot", |angle| with(vec![spot(x(2.0), Vec3::NEG_Z, [0.0, angle])]), [0.15, 1.57]);
     assert_gradual("distance of a point", |height| with(vec![point(x(height))]), [1e-3, 1e3]);
     assert_gradual("height over a sphere", |gap| with(vec![sphere((0.1 + gap) * Vec3::Z, 0.1)]), [1e-4, 1e3]);
+}
+
+/// Lights that move, change their brightness or their kind: what is sampled is what a new build would sample, and densities
+/// agree.
+#[test]
+fn lights_are_replaced_without_a_rebuild() {
+    let mut pcg = Pcg32::new(19, 151);
+    for number in 0..12 {
+        let (mut lights, lamps) = mixed(&mut pcg, number);
+        let before = lights.to_bytes();
+        let same: Vec<_> = (0..).map(LightId::from_index).zip(&lamps).map(|(id, kind)| (id, kind.lamp)).collect();
+        lights.refit_lights(&same).expect("valid updates");
+        lights.refit(&[MeshUpdate::new(MeshId::from_index(0)).scaled(1.0)]).expect("a valid update");
+        // Scales are kept once they were set; everything else is as before.
+        let mut again = LightSampler::clone(&lights);
+        again.refit(&[]).expect("no update");
+        assert_eq!(again.to_bytes(), lights.to_bytes());
+        assert!(lights.to_bytes().len() >= before.len());
+        let moved: Vec<Kind> = (0..lamps.len().div_ceil(11)).flat_map(|_| kinds(&mut pcg)).collect();
+        let shifted: Vec<_> = same.iter().zip(moved.iter().rev()).map(|((id, _), kind)| (*id, kind.lamp)).collect();
+        lights.refit_lights(&shifted).expect("valid updates");
+        assert!(lights.decay() > 0.0);
+        let words = aligned(&lights.to_bytes());
+        let view = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+        for i in 0..60 {
+            let x = ShadingPoint::new(2.0 * Vec3::from_array(pcg.cube()) - 0.5, receivers(&mut pcg)[i % 3]);
+            let at = view.at(&x);
+            for _ in 0..20 {
+                let Some(sample) = at.sample(pcg.cube()) else { continue };
+                assert_close(pdf_again(&at, &sample), sample.pdf, &(x, sample));
+                assert_eq!(lights.at(&x).sample([0.5; 3]), at.sample([0.5; 3]));
+            }
+        }
+    }
+}
+
+#[test]
+fn lights_that_cannot_be_replaced_are_clear_errors() {
+    let mut builder = LightSampler::builder();
+    let lit = builder.add_light(SphereLight::new(Vec3::Z, 0.5, 1.0)).expect("a valid lamp");
+    let black = builder.add_light(PointLight::new(Vec3::Z, 0.0)).expect("a valid lamp");
+    let mut lights = builder.build().expect("few lights");
+    let before = lights.to_bytes();
+    let mut refuse = |id: LightId, lamp: Lamp, part: &str| {
+        let error = lights.refit_lights(&[(lit, point(Vec3::X).lamp), (id, lamp)]).expect_err("no such light");
+        assert!(error.to_string().contains(part), "{error}");
+        assert_eq!(lights.to_bytes(), before);
+    };
+    refuse(LightId::from_index(2), point(Vec3::X).lamp, "light 2");
+    refuse(black, point(Vec3::X).lamp, "light 1");
+    refuse(lit, SphereLight::new(Vec3::Z, -1.0, 1.0).into(), "radius");
+    // Switched off and on again.
+    let x = ShadingPoint::surface(Vec3::ZERO, Vec3::Z);
+    lights.refit_lights(&[(lit, PointLight::new(Vec3::Z, 0.0).into())]).expect("a valid update");
+    assert_eq!((lights.at(&x).sample([0.5; 3]), lights.emission().sample([0.5; 5])), (None, None));
+    let words = aligned(&lights.to_bytes());
+    LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+    lights.refit_lights(&[(lit, PointLight::new(Vec3::Z, 2.0).into())]).expect("a valid update");
+    assert!(lights.at(&x).sample([0.5; 3]).is_some_and(|sample| sample.light == SampledLight::Punctual(lit)));
 }

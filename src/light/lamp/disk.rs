@@ -12,7 +12,7 @@ use crate::geometry::{Aabb, Cone};
 use crate::light::Sides;
 use crate::light::emitted::{EmittedRay, cosine_ray, per_direction};
 use crate::math;
-use crate::receiver::Receiver;
+use crate::receiver::{Receiver, ShadingPoint};
 use crate::warp::Variate;
 use crate::warp::spherical_ellipse::SphericalEllipse;
 
@@ -105,8 +105,8 @@ impl LampKind for DiskLight {
         }
     }
 
-    fn view(&self, position: Vec3) -> Option<ShapeView> {
-        let (center, normal) = (self.center.as_dvec3() - position.as_dvec3(), self.exact_normal());
+    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+        let (center, normal) = (self.center.as_dvec3() - x.position.as_dvec3(), self.exact_normal());
         let side = -normal.dot(center);
         let is_seen = side > 0.0 || (side < 0.0 && self.two_sided);
         is_seen.then(|| ShapeView::Disk(DiskView::new(center, normal, self.radius.into())))

@@ -145,8 +145,8 @@ trait LampKind: Sized {
     /// Returns where the lamp is and which way it sends.
     fn reach(&self) -> Reach;
 
-    /// Returns the lamp as seen from a point; `None` where nothing can arrive, whatever the receiver.
-    fn view(&self, position: Vec3) -> Option<ShapeView>;
+    /// Returns the lamp as seen from a shading point; `None` where nothing can arrive, whatever the receiver.
+    fn view(&self, x: &ShadingPoint) -> Option<ShapeView>;
 
     /// Whether a ray in a unit direction meets a side that shines back along it.
     fn is_crossed(&self, origin: Vec3, direction: DVec3) -> bool;
@@ -280,9 +280,9 @@ impl LampRecord {
         bytemuck::cast(self)
     }
 
-    /// Whether the numbers, which may come from outside, are those of a lamp that emits.
+    /// Whether the numbers, which may come from outside, are those of a lamp.
     pub(super) fn is_valid(&self) -> bool {
-        self.decode().is_some_and(|lamp| of_lamp!(lamp, kind => kind.check().is_ok() && kind.weight() > 0.0))
+        self.decode().is_some_and(|lamp| of_lamp!(lamp, kind => kind.check().is_ok()))
     }
 
     /// Whether the lamp has an extent.
@@ -358,7 +358,7 @@ impl LampView {
         if !x.position.to_array().iter().all(|x| x.abs() <= FARTHEST_POINT) {
             return None;
         }
-        let shape = of_lamp!(lamp.lamp(), kind => kind.view(x.position))?;
+        let shape = of_lamp!(lamp.lamp(), kind => kind.view(x))?;
         let is_below = x.receiver.has_horizon() && {
             let [height, size] = of_view!(&shape, view => view.highest(x.receiver.normal().as_dvec3()));
             height < f64::from(-HORIZON_ROUNDING) * size

@@ -8,7 +8,7 @@ use super::{Fault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_posi
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
 use crate::math;
-use crate::receiver::{Receiver, ReceiverKind};
+use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::warp::Variate;
 use crate::warp::spherical_cap::{self, SphericalCap};
 
@@ -81,8 +81,8 @@ impl LampKind for PointLight {
         }
     }
 
-    fn view(&self, position: Vec3) -> Option<ShapeView> {
-        PointView::new(self.position, position, |_| 1.0).map(ShapeView::Point)
+    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+        PointView::new(self.position, x.position, |_| 1.0).map(ShapeView::Point)
     }
 
     fn is_crossed(&self, _origin: Vec3, _direction: DVec3) -> bool {

@@ -1,4 +1,4 @@
-//! A sphere of constant radiance, sampled by the solid angle of the cone that it fills.
+//! A sphere of constant radiance, sampled by the cone that it fills: by its solid angle, or by the cosine over a surface.
 
 use core::f32::consts::PI;
 
@@ -12,8 +12,9 @@ use crate::geometry::{Aabb, Cone};
 use crate::light::Sides;
 use crate::light::emitted::{EmittedRay, cosine_ray, per_direction};
 use crate::math;
-use crate::receiver::Receiver;
+use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::warp::Variate;
+use crate::warp::projected_cap::ProjectedCap;
 use crate::warp::spherical_cap::{self, SphericalCap};
 
 /// A sphere that sends the same radiance from all of its surface.
@@ -91,14 +92,15 @@ impl LampKind for SphereLight {
             emission: PI,
             // Without a normal there is no other side.
             two_sided: false,
+            // From outside, a sphere sends what a point at its center would.
             mean: self.center,
-            variance: self.radius * self.radius,
+            variance: 0.0,
             normal: Vec3::ZERO,
         }
     }
 
-    fn view(&self, position: Vec3) -> Option<ShapeView> {
-        let center = self.center.as_dvec3() - position.as_dvec3();
+    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+        let center = self.center.as_dvec3() - x.position.as_dvec3();
         let (distance, radius) = (math::sqrt64(center.length_squared()), f64::from(self.radius));
         let beyond = (distance - radius) * (distance + radius);
         let is_outside = beyond > 0.0;
@@ -111,7 +113,9 @@ impl LampKind for SphereLight {
         } else {
             SphericalCap::whole()
         };
-        Some(ShapeView::Sphere(SphereView { center, radius, beyond, cap }))
+        let normal = x.receiver.normal().as_dvec3().try_normalize();
+        let projected = normal.filter(|_| x.receiver.has_horizon()).and_then(|normal| ProjectedCap::new(&cap, normal));
+        Some(ShapeView::Sphere(SphereView { center, radius, beyond, cap, projected }))
     }
 
     fn is_crossed(&self, origin: Vec3, direction: DVec3) -> bool {
@@ -146,15 +150,18 @@ pub(super) struct SphereView {
     beyond: f64,
     /// Directions to the sphere.
     cap: SphericalCap,
+    /// The part of them above the horizon, if there is one.
+    projected: Option<ProjectedCap>,
 }
 
 impl ShapeViewKind for SphereView {
     fn draw(&self, u: [Variate; 2]) -> DVec3 {
-        self.cap.direction(u.map(|u| u.value()))
+        let u = u.map(|u| u.value());
+        self.projected.as_ref().map_or_else(|| self.cap.direction(u), |projected| projected.direction(u))
     }
 
-    fn pdf(&self, _direction: DVec3) -> f64 {
-        1.0 / self.cap.solid_angle()
+    fn pdf(&self, direction: DVec3) -> f64 {
+        self.projected.as_ref().map_or_else(|| 1.0 / self.cap.solid_angle(), |projected| projected.pdf(direction))
     }
 
     fn point(&self, direction: DVec3) -> DVec3 {

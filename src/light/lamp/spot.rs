@@ -9,6 +9,7 @@ use super::{Fault, LampKind, Reach, ShapeView, VALUES, check_axis, check_positio
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
 use crate::math;
+use crate::receiver::ShadingPoint;
 use crate::warp::Variate;
 use crate::warp::spherical_cap::SphericalCap;
 
@@ -114,8 +115,8 @@ impl LampKind for SpotLight {
         }
     }
 
-    fn view(&self, position: Vec3) -> Option<ShapeView> {
-        PointView::new(self.position, position, |direction| self.falloff(direction)).map(ShapeView::Point)
+    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+        PointView::new(self.position, x.position, |direction| self.falloff(direction)).map(ShapeView::Point)
     }
 
     fn is_crossed(&self, _origin: Vec3, _direction: DVec3) -> bool {

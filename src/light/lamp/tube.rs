@@ -17,7 +17,7 @@ use crate::geometry::{Aabb, Cone};
 use crate::light::POSITION_LIMIT;
 use crate::light::emitted::{EmittedRay, cosine_ray, per_direction};
 use crate::math;
-use crate::receiver::Receiver;
+use crate::receiver::{Receiver, ShadingPoint};
 use crate::warp::Variate;
 
 /// A tube: the round surface of a cylinder, which sends the same radiance from all of its outside.
@@ -108,8 +108,8 @@ impl LampKind for TubeLight {
         }
     }
 
-    fn view(&self, position: Vec3) -> Option<ShapeView> {
-        let [start, end] = self.ends.map(|end| end.as_dvec3() - position.as_dvec3());
+    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+        let [start, end] = self.ends.map(|end| end.as_dvec3() - x.position.as_dvec3());
         TubeView::new([start, end], self.axis(), self.radius.into()).map(ShapeView::Tube)
     }
 
