@@ -7,7 +7,6 @@
 use glam::Vec3;
 
 use super::importance::Estimates;
-use crate::geometry::HORIZON_ROUNDING;
 use crate::math;
 use crate::receiver::ReceiverLanes;
 use crate::tlas::node::{Child, Node, WIDE, wide};
@@ -17,43 +16,65 @@ use crate::tlas::node::{Child, Node, WIDE, wide};
 const CONE_ROUNDING: f32 = 1e-5;
 
 impl<const N: usize> Node<N> {
-    /// Returns the estimates, corrected for the children marked with [`LANE_SHAPED`](crate::tlas::node::LANE_SHAPED).
+    /// Returns the estimates, corrected for the children marked with
+    /// [`LANE_SHAPED`](crate::tlas::node::LANE_SHAPED).
     #[inline(never)]
     pub(super) fn shaped(&self, x: &ReceiverLanes, mut estimates: Estimates<N>) -> Estimates<N> {
-        let mut waiting = self.shaped_lanes();
-        let origin = Vec3::from_array(self.origin) - x.position;
-        let step = Vec3::from_array(self.steps.map(wide));
-        let (centers, halves) = (self.centers, self.halves);
+        let shaped = self.shaped_lanes();
+        let [everywhere, above] = self.everywhere_and_above(x);
+        // No side is averted of what sends everywhere: what is left of the doubt is the horizon.
+        estimates.doubtful[0] &= !(shaped & everywhere & above);
+        let mut waiting = shaped & !everywhere;
+        if waiting == 0 {
+            return estimates;
+        }
         while waiting != 0 {
             let lane = waiting.trailing_zeros() as usize;
             waiting &= waiting - 1;
-            let bit = 1 << lane;
-            let at = |codes: &[[u8; N]; 3]| Vec3::from_array([0, 1, 2].map(|axis| f32::from(codes[axis][lane])));
-            let (center, half) = (origin + at(&centers) * step, 0.5 * at(&halves) * step);
-            let distance = center.length();
-            if self.tangents[lane] == WIDE {
-                // No side is averted: what is left of the doubt is the horizon.
-                let lowest = x.horizon.dot(center) + x.lift - x.horizon.abs().dot(half);
-                let slack = HORIZON_ROUNDING * x.horizon.abs().element_sum() * (distance + 2.0 * half.length());
-                if lowest > slack {
-                    estimates.doubtful[0] &= !bit;
-                }
-                continue;
-            }
-            // Distance of the shading point from the cone, less the radius of the ball that holds all of its apexes.
-            let (axis, [sin, cos], _) = self.cone(lane);
-            let along = -axis.dot(center);
-            let across = math::sqrt((distance * distance - along * along).max(0.0));
-            if across * cos - along * sin > half.length() + CONE_ROUNDING * distance {
-                estimates.weights[lane] = 0.0;
-                estimates.doubtful.iter_mut().for_each(|set| *set &= !bit);
-                estimates.opened &= !bit;
-            } else if let (Child::Leaf(_), true) = (self.child(lane), estimates.weights[lane] > 0.0) {
-                // Inside of the cone and outside, by its own falloff.
-                estimates.doubtful.iter_mut().for_each(|set| *set |= bit);
-            }
+            self.focus(lane, x, &mut estimates);
         }
         estimates.largest = estimates.weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()));
         estimates
+    }
+
+    /// Corrects the estimates of a child that sends into a narrow cone.
+    fn focus(&self, lane: usize, x: &ReceiverLanes, estimates: &mut Estimates<N>) {
+        let bit = 1 << lane;
+        let step = Vec3::from_array(self.steps.map(wide));
+        let (centers, halves) = (self.centers, self.halves);
+        let at = |codes: &[[u8; N]; 3]| Vec3::from_array([0, 1, 2].map(|axis| f32::from(codes[axis][lane])));
+        let center = Vec3::from_array(self.origin) - x.position + at(&centers) * step;
+        let (distance, radius) = (center.length(), 0.5 * (at(&halves) * step).length());
+        // Distance of the shading point from the cone, less the radius of the ball that holds all of its apexes.
+        let (axis, [sin, cos], _) = self.cone(lane);
+        let along = -axis.dot(center);
+        let across = math::sqrt((distance * distance - along * along).max(0.0));
+        if across * cos - along * sin > radius + CONE_ROUNDING * distance {
+            estimates.weights[lane] = 0.0;
+            estimates.doubtful.iter_mut().for_each(|set| *set &= !bit);
+            estimates.opened &= !bit;
+        } else if let (Child::Leaf(_), true) = (self.child(lane), estimates.weights[lane] > 0.0) {
+            // Inside of the cone and outside, by its own falloff.
+            estimates.doubtful.iter_mut().for_each(|set| *set |= bit);
+        }
+    }
+
+    /// Returns two sets of bits: children some of which send everywhere, and children above the horizon for certain.
+    fn everywhere_and_above(&self, x: &ReceiverLanes) -> [u32; 2] {
+        let origin = Vec3::from_array(self.origin) - x.position;
+        let step = Vec3::from_array(self.steps.map(wide));
+        let (centers, halves, tangents) = (self.centers, self.halves, self.tangents);
+        let (horizon, absolute_horizon) = (x.horizon, x.horizon.abs());
+        let (mut everywhere, mut above) = (0, 0);
+        for i in 0..N {
+            let half = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
+            let center = Vec3::new(f32::from(centers[0][i]), f32::from(centers[1][i]), f32::from(centers[2][i]));
+            let (half, center) = (0.5 * half * step, origin + center * step);
+            let lowest = horizon.dot(center) + x.lift - absolute_horizon.dot(half);
+            let slack = x.slack * (math::sqrt(center.length_squared()) + 2.0 * math::sqrt(half.length_squared()));
+            above |= u32::from(lowest > slack) << i;
+            everywhere |= u32::from(tangents[i] == WIDE) << i;
+        }
+        [everywhere, above]
     }
 }
