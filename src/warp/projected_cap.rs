@@ -150,7 +150,9 @@ mod tests {
                 assert!((mean - exact).abs() < 0.01 * exact + 1e-12, "{sin} {step}: {mean} {exact}");
                 let is_whole = tilt.cos() >= sin;
                 assert!(if is_whole { deviation < 1e-3 } else { deviation < 0.5 }, "{sin} {step}: {deviation}");
-                assert!((deviation - before).abs() < 0.18, "{sin} {step}: from {before} to {deviation}");
+                // Steps of three degrees are small for wide caps.
+                let is_gradual = sin < 0.5 || (deviation - before).abs() < 0.1;
+                assert!(is_gradual, "{sin} {step}: from {before} to {deviation}");
                 before = deviation;
             }
             before = 0.0;
