@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::importance::Estimates;
 use crate::math;
 use crate::receiver::ReceiverLanes;
+use crate::simd::{InstructionSet, Kernel};
 use crate::tlas::node::{Child, Node, WIDE, wide};
 
 /// Rounding granted to the distance from a cone, relative to that of the cluster. *Proved*: covers the rounding of the axis to
@@ -20,8 +21,7 @@ impl<const N: usize> Node<N> {
     /// [`LANE_SHAPED`](crate::tlas::node::LANE_SHAPED).
     #[inline(never)]
     pub(super) fn shaped(&self, x: &ReceiverLanes, mut estimates: Estimates<N>) -> Estimates<N> {
-        let shaped = self.shaped_lanes();
-        let [everywhere, above] = self.everywhere_and_above(x);
+        let [shaped, everywhere, above] = InstructionSet::best().run(LaneSets { node: self, x });
         // No side is averted of what sends everywhere: what is left of the doubt is the horizon.
         estimates.doubtful[0] &= !(shaped & everywhere & above);
         let mut waiting = shaped & !everywhere;
@@ -58,12 +58,24 @@ impl<const N: usize> Node<N> {
             estimates.doubtful.iter_mut().for_each(|set| *set |= bit);
         }
     }
+}
 
-    /// Returns two sets of bits: children some of which send everywhere, and children above the horizon for certain.
-    fn everywhere_and_above(&self, x: &ReceiverLanes) -> [u32; 2] {
-        let origin = Vec3::from_array(self.origin) - x.position;
-        let step = Vec3::from_array(self.steps.map(wide));
-        let (centers, halves, tangents) = (self.centers, self.halves, self.tangents);
+/// Finds three sets of bits: children that are marked, children some of which send everywhere, and children above the horizon
+/// for certain.
+struct LaneSets<'a, const N: usize> {
+    node: &'a Node<N>,
+    x: &'a ReceiverLanes,
+}
+
+impl<const N: usize> Kernel for LaneSets<'_, N> {
+    type Output = [u32; 3];
+
+    #[inline(always)]
+    fn run(self) -> [u32; 3] {
+        let Self { node, x } = self;
+        let origin = Vec3::from_array(node.origin) - x.position;
+        let step = Vec3::from_array(node.steps.map(wide));
+        let (centers, halves, tangents) = (node.centers, node.halves, node.tangents);
         let (horizon, absolute_horizon) = (x.horizon, x.horizon.abs());
         let (mut everywhere, mut above) = (0, 0);
         for i in 0..N {
@@ -75,6 +87,6 @@ impl<const N: usize> Node<N> {
             above |= u32::from(lowest > slack) << i;
             everywhere |= u32::from(tangents[i] == WIDE) << i;
         }
-        [everywhere, above]
+        [node.shaped_lanes(), everywhere, above]
     }
 }
