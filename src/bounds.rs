@@ -11,8 +11,11 @@ use crate::math;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightBounds {
     pub(crate) aabb: Aabb,
-    /// Normals of the front sides. Every light sends over the hemisphere around its normal (θe = π/2).
+    /// Normals of the front sides.
     pub(crate) normals: Cone,
+    /// Largest angle to its normal at which a light sends (θe): π/2 for surfaces, less for spots, and π for what sends in all
+    /// directions and has no normal.
+    pub(crate) emission: f32,
     /// Weight times area of what does not depend on the direction it is seen from: mesh lights, and portals to a
     /// constant environment.
     pub(crate) flux: f32,
@@ -24,8 +27,14 @@ pub(crate) struct LightBounds {
 
 impl LightBounds {
     /// Bounds of no light.
-    pub(crate) const NONE: Self =
-        Self { aabb: Aabb::EMPTY, normals: Cone::single(Vec3::Z), flux: 0.0, portal: 0.0, two_sided: false };
+    pub(crate) const NONE: Self = Self {
+        aabb: Aabb::EMPTY,
+        normals: Cone::single(Vec3::Z),
+        emission: 0.0,
+        flux: 0.0,
+        portal: 0.0,
+        two_sided: false,
+    };
 
     /// Returns the bounds of both clusters together.
     pub(crate) fn union(self, mut other: Self) -> Self {
@@ -36,6 +45,7 @@ impl LightBounds {
         Self {
             aabb: self.aabb.union(other.aabb),
             normals: self.normals.union(other.normals),
+            emission: self.emission.max(other.emission),
             flux: self.flux + other.flux,
             portal: self.portal + other.portal,
             two_sided: self.two_sided || other.two_sided,

@@ -71,6 +71,8 @@ pub(crate) enum ErrorKind {
     ProceduralBounds { mesh: usize, region: [[f32; 2]; 2], bounds: [f32; 2] },
     /// What a function gives at a place is not within the bound that it gives over a box around it.
     ProceduralWeight { mesh: usize, uv: [f32; 2], value: f32, region: [[f32; 2]; 2], bounds: [f32; 2] },
+    /// A light without triangles of which a number is NaN, infinite or out of its range.
+    Lamp { light: usize, what: &'static str, value: f32, expected: &'static str },
     /// A handle to a texture that this builder did not give out.
     UnknownTexture { mesh: usize, texture: usize, textures: usize },
     /// A mesh that a sampler does not hold.
@@ -79,6 +81,10 @@ pub(crate) enum ErrorKind {
     TriangleCount { mesh: usize, found: usize, expected: usize },
     /// A triangle that is not in the tree, for it had no area, but would have to be.
     Revived { mesh: usize, triangle: usize },
+    /// A light without triangles that a sampler does not hold.
+    UnknownLight { light: usize, lights: usize },
+    /// A light without triangles that is not in the tree, for it emitted nothing, but would have to be.
+    RevivedLight { light: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -139,6 +145,9 @@ impl fmt::Display for Error {
                 write!(f, "mesh {mesh}: the weight at uv ({u}, {v}) is {value}, but its bounds over uv ")?;
                 write!(f, "({u0}, {v0}) to ({u1}, {v1}) are {min} and {max}")
             }
+            ErrorKind::Lamp { light, what, value, expected } => {
+                write!(f, "light {light}: the {what} is {value}, but must be {expected}")
+            }
             ErrorKind::UnknownTexture { mesh, texture, textures } => {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")
             }
@@ -150,6 +159,12 @@ impl fmt::Display for Error {
             }
             ErrorKind::Revived { mesh, triangle } => {
                 write!(f, "mesh {mesh}: triangle {triangle} has an area now, but had none when the sampler was built")
+            }
+            ErrorKind::UnknownLight { light, lights } => {
+                write!(f, "light {light} was never added, this sampler has {lights}")
+            }
+            ErrorKind::RevivedLight { light } => {
+                write!(f, "light {light} emits now, but emitted nothing when the sampler was built")
             }
             ErrorKind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             ErrorKind::Cancelled => write!(f, "the build was cancelled"),

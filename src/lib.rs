@@ -54,8 +54,11 @@
 //! The first and the third belong together in multiple importance sampling, and so do the second and the fourth. A
 //! portal does not end a ray: where a second portal may lie on the way, use the first and the third.
 //!
-//! Photons start with [`LightSampler::emission`]. For the photons of a point light, call
-//! [`sample`](PointSampler::sample) at a [`ShadingPoint::volume`] at its position.
+//! Lights that are not made of triangles are in the same tree: [`SphereLight`], [`DiskLight`], [`TubeLight`], and without an
+//! extent [`PointLight`] and [`SpotLight`]. [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a
+//! [`LightId`].
+//!
+//! Photons start with [`LightSampler::emission`].
 //!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
 //! BSDF samples, or with [`Environment::sample`], or make the environment a light
@@ -84,7 +87,7 @@
 //! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
-//! - punctual lights: points, spots and directions without an extent.
+//! - distant lights without a position: directions. (A sun belongs into the environment.)
 //! - updates of a built sampler, except that the environment can be rotated, and that lights can move and change their
 //!   brightness ([`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
@@ -93,7 +96,8 @@
 //!
 //! Lengths are in any unit, as long as it is the same everywhere; coordinates go up to 1e9. The weight of an emitter is
 //! its radiance, the weight of a portal its transmittance, and the environment holds radiance. Radiance is in any unit
-//! too, but in the same unit for emitters and environment, because they compete for samples.
+//! too, but in the same unit for emitters and environment, because they compete for samples. The weight of a light without
+//! an extent is its radiant intensity: radiance times the square of the unit of length.
 //!
 //! Densities are per solid angle at the shading point (1/sr) unless their name or their documentation says per area of
 //! the light. `pmf` is a probability, without a unit.
@@ -157,9 +161,11 @@ pub use env::{Environment, EnvironmentImage, EnvironmentSample, EnvironmentView,
 pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
-pub use light::{Illumination, Mesh, MeshUpdate, Sides, Weight};
+pub use light::{
+    DiskLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Sides, SphereLight, SpotLight, TubeLight, Weight,
+};
 pub use receiver::{Receiver, ShadingPoint};
-pub use record::{Filter, Hit, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
+pub use record::{Filter, Hit, LightId, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
 };

@@ -5,12 +5,12 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
-use super::{Energies, Illumination, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
+use super::{Energies, Illumination, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
 use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
 use crate::progress::Progress;
-use crate::record::{MeshId, TextureId};
+use crate::record::{LightId, MeshId, TextureId};
 use crate::tlas::MAX_LEAVES;
 
 /// What a textured weight is read from.
@@ -28,6 +28,8 @@ pub(crate) struct LightCollection<'a> {
     indices: Vec<u32>,
     /// Where each mesh starts in `indices`, and the end.
     meshes: Vec<u32>,
+    /// Lights that are not made of triangles.
+    lamps: Vec<LampRecord>,
     cells: Vec<CellNode>,
     /// Trees over functions by texture and the bits of the three uvs.
     shared: BTreeMap<TreeKey, Root>,
@@ -55,6 +57,7 @@ impl<'a> LightCollection<'a> {
             triangles: Vec::new(),
             indices: Vec::new(),
             meshes: vec![0],
+            lamps: Vec::new(),
             cells: Vec::new(),
             shared: BTreeMap::new(),
             images: Vec::new(),
@@ -63,9 +66,9 @@ impl<'a> LightCollection<'a> {
         }
     }
 
-    /// Numbers of textures, meshes and triangles that were added.
-    pub(crate) fn counts(&self) -> [usize; 3] {
-        [self.textures.len(), self.meshes.len() - 1, self.indices.len()]
+    /// Numbers of textures, meshes, triangles and lamps that were added.
+    pub(crate) fn counts(&self) -> [usize; 4] {
+        [self.textures.len(), self.meshes.len() - 1, self.indices.len(), self.lamps.len()]
     }
 
     pub(crate) fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
@@ -103,14 +106,24 @@ impl<'a> LightCollection<'a> {
         Ok(MeshId(number as u32))
     }
 
+    /// Adds a light that is not made of triangles. After an error the collection is as it was before.
+    pub(crate) fn add_lamp(&mut self, lamp: Lamp) -> Result<LightId, Error> {
+        let number = self.lamps.len();
+        if number >= MAX_LEAVES {
+            return Err(Error(ErrorKind::TooMany { what: "lights", count: number + 1, limit: MAX_LEAVES }));
+        }
+        self.lamps.push(lamp.record(number as u32)?);
+        Ok(LightId(number as u32))
+    }
+
     /// Returns the units of work of [`Self::build_images`].
     pub(crate) fn image_work(&self) -> f64 {
         blas::image_work(&self.images)
     }
 
-    /// Number of triangles that may emit, by what is known of them.
-    pub(crate) fn triangle_count(&self) -> usize {
-        self.triangles.len()
+    /// Number of lights that may emit, by what is known of them.
+    pub(crate) fn light_count(&self) -> usize {
+        self.triangles.len() + self.lamps.len()
     }
 
     /// Builds the trees over images. Only then the lights are complete.
@@ -162,14 +175,18 @@ impl<'a> LightCollection<'a> {
         }
     }
 
-    /// Returns a light by its index among those that may emit.
+    /// Returns a light by its index among those that may emit: first the triangles, then the lamps.
     pub(crate) fn light(&self, index: u32) -> Light<'_> {
-        Light::Triangle(&self.triangles[index as usize])
+        let index = index as usize;
+        match self.triangles.get(index) {
+            Some(triangle) => Light::Triangle(triangle),
+            None => Light::Lamp(&self.lamps[index - self.triangles.len()]),
+        }
     }
 
     /// Returns the energy of all lights together.
     pub(crate) fn total_energy(&self, energies: &Energies<'_>) -> f64 {
-        energies.total(self.triangles.len(), |i| self.light(i as u32))
+        energies.total(self.light_count(), |i| self.light(i as u32))
     }
 
     /// Returns the indices of the lights that emit anything.
@@ -178,11 +195,11 @@ impl<'a> LightCollection<'a> {
     ///
     /// If there are more of them than leaves in a tree.
     pub(crate) fn emitting(&self, energies: &Energies<'_>) -> Result<Vec<u32>, Error> {
-        let emits = parallel::collect(self.triangles.len(), |i| energies.energy(self.light(i as u32)) > 0.0);
+        let emits = parallel::collect(self.light_count(), |i| energies.energy(self.light(i as u32)) > 0.0);
         let emitting: Vec<u32> = (0..).zip(emits).filter_map(|(i, emits)| emits.then_some(i)).collect();
         if emitting.len() > MAX_LEAVES {
             let count = emitting.len();
-            return Err(Error(ErrorKind::TooMany { what: "light triangles", count, limit: MAX_LEAVES }));
+            return Err(Error(ErrorKind::TooMany { what: "lights", count, limit: MAX_LEAVES }));
         }
         Ok(emitting)
     }
@@ -190,19 +207,28 @@ impl<'a> LightCollection<'a> {
     /// Returns the lights with these indices, in the order of leaves that is given.
     pub(crate) fn into_lights(self, illumination: Illumination, leaves: &[u32]) -> Lights {
         let has_portals = self.triangles.iter().any(LightKind::is_portal);
-        let mut leaf_of_index = vec![NO_LEAF; self.triangles.len()];
+        let first_lamp = self.triangles.len() as u32;
+        let mut leaf_of_index = vec![NO_LEAF; self.light_count()];
         for (leaf, &index) in (0..).zip(leaves) {
             leaf_of_index[index as usize] = leaf;
         }
         let leaf_of = |&index: &u32| leaf_of_index.get(index as usize).copied().unwrap_or(index);
+        let lamp_leaves = &leaf_of_index[first_lamp as usize..];
+        let leaf_of = self.indices.iter().map(leaf_of).chain(lamp_leaves.iter().copied()).collect();
+        let record = |leaf: usize| match leaves[leaf].checked_sub(first_lamp) {
+            None => self.triangles[leaves[leaf] as usize],
+            Some(lamp) => self.lamps[lamp as usize].into_triangle(),
+        };
+        let records = parallel::collect(leaves.len(), record);
         Lights {
             illumination,
             energy: 0.0,
             has_portals,
+            has_lamps: leaves.iter().any(|&index| index >= first_lamp),
             is_crossed_once: false,
-            triangles: parallel::collect(leaves.len(), |leaf| self.triangles[leaves[leaf] as usize]),
+            records,
             cells: self.cells,
-            leaf_of: self.indices.iter().map(leaf_of).collect(),
+            leaf_of,
             meshes: self.meshes,
             scales: Vec::new(),
         }

@@ -2,13 +2,13 @@
 //! and nothing else along the ray need be looked for.
 //!
 //! Two arrangements are recognized: lights side by side in one plane, and lights on the surface of one convex body that all
-//! face into it, such as the windows of a room. A ray leaves a convex body once.
+//! face into it, such as the windows of a room. A ray leaves a convex body once. Lamps without an extent are never crossed.
 
 use alloc::vec::Vec;
 
 use glam::DVec3;
 
-use super::{LightKind, LightTriangle, Lights};
+use super::{Light, LightKind, LightTriangle, Lights};
 use crate::math::sqrt64;
 
 /// Most planes that lights may lie in. *Chosen*: a room has six.
@@ -83,7 +83,21 @@ fn extent(light: &LightTriangle) -> f64 {
 impl Lights {
     /// Finds out whether a ray meets at most one light that shines back along it.
     pub(crate) fn find_crossings(&mut self) {
-        self.is_crossed_once = is_crossed_once(&self.triangles);
+        self.is_crossed_once =
+            if self.has_lamps { self.is_mixture_crossed_once() } else { is_crossed_once(&self.records) };
+    }
+
+    /// Whether a ray meets at most one of lights among which are lamps.
+    fn is_mixture_crossed_once(&self) -> bool {
+        let mut triangles = Vec::new();
+        for record in &self.records {
+            match Light::of(record) {
+                Light::Triangle(triangle) => triangles.push(*triangle),
+                Light::Lamp(lamp) if lamp.has_extent() => return false,
+                Light::Lamp(_) => {}
+            }
+        }
+        is_crossed_once(&triangles)
     }
 }
 

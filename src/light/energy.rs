@@ -1,6 +1,5 @@
 //! What each light sends, as the tree over the lights needs to know it.
 
-use super::meshes::scale_of;
 use super::{Light, LightKind};
 use crate::bounds::{LightBounds, Moments};
 use crate::env::Environment;
@@ -39,7 +38,7 @@ impl<'a> Energies<'a> {
         parallel::sum(count, |i| self.energy(light(i)))
     }
 
-    /// Returns weight times area, times mean radiance for a portal. Exactly zero where nothing is emitted.
+    /// Returns weight times what it is multiplied by to compete ([`LightKind::area`]), times mean radiance for a portal. Exactly zero where nothing is emitted.
     pub(crate) fn energy(&self, light: Light<'_>) -> f64 {
         self.energy_of_area(light, light.area())
     }
@@ -47,7 +46,7 @@ impl<'a> Energies<'a> {
     #[inline]
     fn energy_of_area(&self, light: Light<'_>, area: f32) -> f64 {
         let radiance = if light.is_portal() { self.mean } else { 1.0 };
-        let weight = f64::from(light.weight()) * f64::from(scale_of(self.factors, self.meshes, light.index()));
+        let weight = f64::from(light.weight()) * f64::from(light.scale(self.factors, self.meshes));
         weight * f64::from(area) * radiance
     }
 

@@ -5,7 +5,7 @@
 //! warp a square in this way.) No direction is computed, so that a sample costs next to nothing.
 
 use super::triangle_view::TriangleView;
-use super::{DrawnPoint, LightViewKind};
+use super::{DrawnPoint, LightViewKind, LocalPoint};
 use crate::blas::Lattice;
 use crate::math::{at_least, sqrt};
 use crate::receiver::ReceiverKind;
@@ -56,14 +56,15 @@ impl LinearDensity {
     #[inline]
     pub(super) fn sample(&self, view: &TriangleView<'_>, u: [Variate; 2]) -> Option<DrawnPoint> {
         let point = Lattice::inside(square_to_linear_triangle(u.map(|u| u.value()), self.corners));
-        Some(DrawnPoint { point, relative: view.point(point), pdf: self.pdf(view, point)? })
+        let (pdf, relative) = (self.pdf(view, point)?, view.position(point));
+        Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative, pdf })
     }
 
     /// Returns the density per solid angle of a point. `None` where it is not a positive number.
     #[inline]
     pub(super) fn pdf(&self, view: &TriangleView<'_>, point: Lattice) -> Option<f64> {
         let pdf_area = linear_pdf(point.to_barycentrics().map(f64::from), self.corners) / f64::from(view.area);
-        let pdf = pdf_area / view.solid_angle_per_area(view.point(point));
+        let pdf = pdf_area / view.solid_angle_per_area(view.position(point));
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
 }
@@ -91,7 +92,7 @@ mod tests {
             index_and_flags: LightTriangle::TWO_SIDED,
         };
         let x = ShadingPoint::surface(Vec3::ZERO, normal);
-        let view = TriangleView::new(&light, &x, Illumination::default(), &[], None)?;
+        let view = TriangleView::wrapped(&light, &x, Illumination::default(), &[], None, |v| v)?;
         let density = LinearDensity::new(&view)?;
         let [v0, v1, v2] = vertices.map(Vec3::as_dvec3);
         let normal = normal.as_dvec3();
@@ -149,13 +150,14 @@ mod tests {
         };
         let receivers = [ShadingPoint::surface(Vec3::ZERO, Vec3::new(0.6, 0.0, 0.8)), ShadingPoint::volume(Vec3::ZERO)];
         for x in receivers {
-            let view = TriangleView::new(&light, &x, Illumination::default(), &[], None).expect("it is above");
+            let view =
+                TriangleView::wrapped(&light, &x, Illumination::default(), &[], None, |v| v).expect("it is above");
             let density = LinearDensity::new(&view).expect("it is far away");
             let drawn: Vec<DrawnPoint> = (0..1000)
                 .map(|i| [Variate::new(pcg.next_f32(), i), Variate::new(pcg.next_f32(), i + 1)])
                 .map(|u| density.sample(&view, u).expect("all of it is above the horizon"))
                 .collect();
-            assert!(drawn.iter().all(|drawn| density.pdf(&view, drawn.point) == Some(drawn.pdf)));
+            assert!(drawn.iter().all(|drawn| density.pdf(&view, drawn.point.lattice()) == Some(drawn.pdf)));
             // The mean of 1 / pdf is the solid angle, here by Van Oosterom and Strackee 1983.
             let [a, b, c] = corners.map(|v| v.as_dvec3().normalize());
             let solid_angle = 2.0 * (a.dot(b.cross(c)) / (1.0 + a.dot(b) + b.dot(c) + c.dot(a))).abs().atan();

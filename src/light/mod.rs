@@ -10,6 +10,7 @@ mod crossing;
 mod emitted;
 mod energy;
 mod illumination;
+mod lamp;
 mod linear_density;
 mod mesh;
 mod meshes;
@@ -27,13 +28,17 @@ use crate::bounds::{LightBounds, Moments};
 use crate::buffers::buffers;
 use crate::env::EnvironmentView;
 use crate::receiver::ShadingPoint;
-use crate::record::{MeshId, TriangleId};
+use crate::record::{Hit, LightId, MeshId, SampledLight, TriangleId};
+use crate::simd::prefetch;
 use crate::warp::Variate;
 
 pub(crate) use collect::LightCollection;
-pub(crate) use emitted::EmissionStart;
+pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub use illumination::Illumination;
+use lamp::LampRecord;
+pub(crate) use lamp::LampView;
+pub use lamp::{DiskLight, Lamp, PointLight, SphereLight, SpotLight, TubeLight};
 pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
@@ -57,17 +62,19 @@ buffers! {
         energy: f32,
         /// Whether any light is a portal.
         has_portals: bool,
+        /// Whether any light is a lamp.
+        has_lamps: bool,
         /// Whether a ray is known to meet at most one light that shines back along it.
         is_crossed_once: bool,
     }
     buffers {
-        /// Triangles, in the order of the tree's leaves.
-        triangles: LightTriangle = b"TRIA" version 1,
+        /// Triangles, and lamps in records of the same size, in the order of the tree's leaves.
+        records: LightTriangle = b"TRIA" version 1,
         /// Nodes of the trees over textures.
         cells: CellNode = b"CELL" version 2,
         /// Where the triangles of each mesh start in `leaf_of`, and their number at the end.
         meshes: u32 = b"MESH" version 1,
-        /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`].
+        /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`]; then the leaf of every lamp or [`NO_LEAF`].
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
@@ -79,6 +86,8 @@ buffers! {
 pub(crate) enum Light<'a> {
     /// A triangle of an emissive mesh or of a portal.
     Triangle(&'a LightTriangle),
+    /// Anything else.
+    Lamp(&'a LampRecord),
 }
 
 /// A light of any kind as seen from a shading point.
@@ -86,41 +95,75 @@ pub(crate) enum Light<'a> {
 pub(crate) enum LightView<'a> {
     /// A triangle of an emissive mesh or of a portal.
     Triangle(TriangleView<'a>),
+    /// Anything else.
+    Lamp(LampView),
+}
+
+/// A point of a light in the light's own terms: the barycentric coordinates of a point of a triangle, or the direction from
+/// the shading point to a point of a lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LocalPoint([u32; 3]);
+
+impl LocalPoint {
+    /// Returns the point of a triangle.
+    #[inline(always)]
+    pub(crate) fn on_triangle(point: Lattice) -> Self {
+        Self(point.0)
+    }
+
+    /// Returns the coordinates of a point of a triangle.
+    #[inline(always)]
+    pub(crate) fn lattice(self) -> Lattice {
+        Lattice(self.0)
+    }
+
+    /// Any point of a lamp, where it makes no difference which.
+    pub(crate) const NONE: Self = Self([0; 3]);
+
+    /// Returns the point in a direction.
+    #[inline]
+    fn from_direction(direction: Vec3) -> Self {
+        Self(direction.to_array().map(f32::to_bits))
+    }
+
+    /// Returns the direction to a point of a lamp.
+    #[inline]
+    fn to_direction(self) -> Vec3 {
+        Vec3::from_array(self.0.map(f32::from_bits))
+    }
 }
 
 /// A point on a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightPoint {
     pub(crate) leaf: u32,
-    pub(crate) point: Lattice,
+    pub(crate) point: LocalPoint,
 }
 
 /// A point of a light that was drawn.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DrawnPoint {
-    pub(crate) point: Lattice,
+    pub(crate) point: LocalPoint,
     /// Relative to the shading point. The lattice's own point, except where the lattice is too coarse to tell directions
     /// apart.
     pub(crate) relative: DVec3,
-    /// Density per solid angle with which the lattice's point is drawn.
+    /// Density per solid angle with which the point is drawn; the probability of a lamp without an extent, which is 1.
     pub(crate) pdf: f64,
 }
 
 /// What a light of any kind says of itself.
 pub(crate) trait LightKind {
-    /// Returns the light's number among all that were added.
-    fn index(&self) -> u32;
-
     /// Whether the environment shines in through the light.
     fn is_portal(&self) -> bool;
 
     /// Whether the light emits from its back as well.
     fn is_two_sided(&self) -> bool;
 
-    /// Returns the average weight: radiance of an emitter, transmittance of a portal.
+    /// Returns the average weight: radiance of an emitter, transmittance of a portal, intensity of what has no extent.
     fn weight(&self) -> f32;
 
-    /// Returns the area that light leaves from, once for lights of two sides.
+    /// Returns the area that light leaves from, once for lights of two sides. For a light without an extent, the number that
+    /// makes its weight compete.
     fn area(&self) -> f32;
 
     /// Returns bounds and moments. `energy` gives the energy by the area; `directional` says whether it depends on the
@@ -135,10 +178,7 @@ pub(crate) trait LightKind {
     fn irradiance_per_area(&self, x: &ShadingPoint) -> f32;
 
     /// Returns the point where a ray crosses the light, if it does. `direction` need not be a unit vector.
-    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<Lattice>;
-
-    /// Fetches the light's memory, so that a later look at it does not wait.
-    fn prefetch(&self);
+    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint>;
 }
 
 /// What a light of any kind says of itself to a shading point.
@@ -147,20 +187,23 @@ pub(crate) trait LightViewKind {
     fn sample(&self, u: [Variate; 2]) -> Option<DrawnPoint>;
 
     /// Returns the density per solid angle with which [`Self::sample`] draws a point, if that is positive.
-    fn pdf(&self, point: Lattice) -> Option<f64>;
+    fn pdf(&self, point: LocalPoint) -> Option<f64>;
 
     /// Returns a point of the light relative to the shading point.
-    fn point(&self, point: Lattice) -> DVec3;
+    fn point(&self, point: LocalPoint) -> DVec3;
 
-    /// Returns the unit normal of the front side.
-    fn normal(&self) -> Vec3;
+    /// Returns the unit direction to a point of the light, of which place and distance are given.
+    fn direction(&self, point: LocalPoint, relative: DVec3, distance: f64) -> Vec3;
 
-    /// Returns the solid angle at the shading point per area of the light at this place: `cos θl / d²`.
+    /// Returns the unit normal of the front side in a point relative to the shading point.
+    fn normal(&self, point: DVec3) -> Vec3;
+
+    /// Returns the solid angle at the shading point per area of the light at this place: `cos θl / d²`; 1 for a light without
+    /// an extent.
     fn solid_angle_per_area(&self, point: DVec3) -> f64;
 
-    /// Returns an estimate of the irradiance from the light, whose weight is multiplied by `scale`. Zero only if nothing can
-    /// arrive.
-    fn irradiance(&self, scale: f32) -> f32;
+    /// Returns an estimate of the irradiance from the light if this is its weight. Zero only if nothing can arrive.
+    fn irradiance(&self, weight: f32) -> f32;
 }
 
 /// Calls the same method of whichever kind a light is.
@@ -168,16 +211,12 @@ macro_rules! dispatch {
     ($enum:ident, $light:expr, $kind:ident => $call:expr) => {
         match $light {
             $enum::Triangle($kind) => $call,
+            $enum::Lamp($kind) => $call,
         }
     };
 }
 
 impl LightKind for Light<'_> {
-    #[inline]
-    fn index(&self) -> u32 {
-        dispatch!(Light, self, kind => kind.index())
-    }
-
     #[inline]
     fn is_portal(&self) -> bool {
         dispatch!(Light, self, kind => kind.is_portal())
@@ -212,13 +251,8 @@ impl LightKind for Light<'_> {
     }
 
     #[inline]
-    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<Lattice> {
+    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         dispatch!(Light, self, kind => kind.intersect(origin, direction))
-    }
-
-    #[inline(always)]
-    fn prefetch(&self) {
-        dispatch!(Light, self, kind => kind.prefetch());
     }
 }
 
@@ -229,18 +263,23 @@ impl LightViewKind for LightView<'_> {
     }
 
     #[inline]
-    fn pdf(&self, point: Lattice) -> Option<f64> {
+    fn pdf(&self, point: LocalPoint) -> Option<f64> {
         dispatch!(LightView, self, kind => kind.pdf(point))
     }
 
     #[inline]
-    fn point(&self, point: Lattice) -> DVec3 {
+    fn point(&self, point: LocalPoint) -> DVec3 {
         dispatch!(LightView, self, kind => kind.point(point))
     }
 
     #[inline]
-    fn normal(&self) -> Vec3 {
-        dispatch!(LightView, self, kind => kind.normal())
+    fn direction(&self, point: LocalPoint, relative: DVec3, distance: f64) -> Vec3 {
+        dispatch!(LightView, self, kind => kind.direction(point, relative, distance))
+    }
+
+    #[inline]
+    fn normal(&self, point: DVec3) -> Vec3 {
+        dispatch!(LightView, self, kind => kind.normal(point))
     }
 
     #[inline]
@@ -248,8 +287,8 @@ impl LightViewKind for LightView<'_> {
         dispatch!(LightView, self, kind => kind.solid_angle_per_area(point))
     }
 
-    fn irradiance(&self, scale: f32) -> f32 {
-        dispatch!(LightView, self, kind => kind.irradiance(scale))
+    fn irradiance(&self, weight: f32) -> f32 {
+        dispatch!(LightView, self, kind => kind.irradiance(weight))
     }
 }
 
@@ -259,33 +298,67 @@ impl LightView<'_> {
     pub(crate) fn as_portal(&self) -> Option<&TriangleView<'_>> {
         match self {
             Self::Triangle(view) => Some(view),
+            Self::Lamp(_) => None,
         }
     }
 }
 
+impl<'a> Light<'a> {
+    /// Returns the light of a record.
+    #[inline(always)]
+    fn of(record: &'a LightTriangle) -> Self {
+        if record.index_and_flags & LightTriangle::LAMP == 0 {
+            Light::Triangle(record)
+        } else {
+            Light::Lamp(bytemuck::cast_ref(record))
+        }
+    }
+
+    /// Returns the triangle; `None` for anything else.
+    #[inline(always)]
+    fn triangle(self) -> Option<&'a LightTriangle> {
+        match self {
+            Self::Triangle(triangle) => Some(triangle),
+            Self::Lamp(_) => None,
+        }
+    }
+
+    /// Returns what the weight of the light is multiplied by, by the factors of the meshes.
+    #[inline]
+    fn scale(self, factors: &[f32], meshes: &[u32]) -> f32 {
+        self.triangle().map_or(1.0, |triangle| scale_of(factors, meshes, triangle.index()))
+    }
+}
+
 impl LightPoint {
-    /// Returns the point of a light with barycentrics that may have been rounded.
+    /// Returns the point of a triangle with barycentrics that may have been rounded.
     #[inline]
     pub(crate) fn new(leaf: u32, barycentrics: [f32; 2]) -> Self {
-        Self { leaf, point: Lattice::from_barycentrics(barycentrics) }
+        Self { leaf, point: LocalPoint::on_triangle(Lattice::from_barycentrics(barycentrics)) }
     }
 }
 
 impl<'a> LightsView<'a> {
     /// Number of lights.
     pub(crate) fn len(&self) -> usize {
-        self.triangles.len()
+        self.records.len()
     }
 
     /// Whether there is no light.
     pub(crate) fn is_empty(&self) -> bool {
-        self.triangles.is_empty()
+        self.len() == 0
     }
 
     /// Returns the light in a leaf.
     #[inline(always)]
     pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
-        Light::Triangle(&self.triangles[leaf as usize])
+        Light::of(&self.records[leaf as usize])
+    }
+
+    /// Fetches the memory of the light in a leaf, so that a later look at it does not wait.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, leaf: u32) {
+        prefetch(&self.records[leaf as usize]);
     }
 
     /// Returns a light as seen from a shading point; `None` if nothing can arrive from it. `environment` is what portals
@@ -300,8 +373,12 @@ impl<'a> LightsView<'a> {
     where
         'a: 'v,
     {
-        let light = &self.triangles[leaf as usize];
-        TriangleView::new(light, x, self.illumination, self.cells, environment).map(LightView::Triangle)
+        match self.light(leaf) {
+            Light::Triangle(light) => {
+                TriangleView::wrapped(light, x, self.illumination, self.cells, environment, LightView::Triangle)
+            }
+            Light::Lamp(lamp) => LampView::new(lamp, x).map(LightView::Lamp),
+        }
     }
 
     /// Returns the leaf of a triangle; `None` for one that emits nothing or that was never added.
@@ -313,9 +390,42 @@ impl<'a> LightsView<'a> {
         self.leaf_of.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
     }
 
-    /// Returns the triangle in a leaf.
-    pub(crate) fn id(&self, leaf: u32) -> TriangleId {
-        let index = self.light(leaf).index();
+    /// Returns the leaf of a lamp; `None` for one that emits nothing or that was never added.
+    pub(crate) fn leaf_of_lamp(&self, id: LightId) -> Option<u32> {
+        let index = self.meshes.last()?.checked_add(id.0)?;
+        self.leaf_of.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
+    }
+
+    /// Returns the leaf of what was sampled; `None` for the environment.
+    pub(crate) fn leaf_of_sampled(&self, light: &SampledLight) -> Option<u32> {
+        match light {
+            SampledLight::Triangle(hit) => self.leaf(hit.triangle),
+            SampledLight::Shape(id) | SampledLight::Punctual(id) => self.leaf_of_lamp(*id),
+            SampledLight::Environment => None,
+        }
+    }
+
+    /// Returns what a host gets to know of a point of a light.
+    pub(crate) fn sampled(&self, LightPoint { leaf, point }: LightPoint) -> SampledLight {
+        match self.light(leaf) {
+            Light::Triangle(triangle) => SampledLight::Triangle(Hit {
+                triangle: self.id(triangle),
+                barycentrics: point.lattice().to_barycentrics(),
+            }),
+            Light::Lamp(lamp) => lamp.sampled(),
+        }
+    }
+
+    /// Returns the point of a lamp in a direction; `None` for a lamp without an extent, or one that emits nothing or was never
+    /// added.
+    pub(crate) fn point_of_lamp(&self, id: LightId, direction: Vec3) -> Option<LightPoint> {
+        let leaf = self.leaf_of_lamp(id)?;
+        let Light::Lamp(lamp) = self.light(leaf) else { return None };
+        lamp.has_extent().then(|| LightPoint { leaf, point: LocalPoint::from_direction(direction) })
+    }
+
+    fn id(&self, triangle: &LightTriangle) -> TriangleId {
+        let index = triangle.index();
         let mesh = mesh_of(self.meshes, index);
         TriangleId::new(MeshId(mesh as u32), index.wrapping_sub(self.meshes[mesh]))
     }
@@ -323,6 +433,6 @@ impl<'a> LightsView<'a> {
     /// Returns what the weight of a light is multiplied by.
     #[inline]
     pub(crate) fn scale(&self, leaf: u32) -> f32 {
-        scale_of(self.scales, self.meshes, self.light(leaf).index())
+        self.light(leaf).scale(self.scales, self.meshes)
     }
 }

@@ -1,16 +1,15 @@
 //! A triangle of an emissive mesh or of a portal.
 
-use core::f32::consts::PI;
+use core::f32::consts::{FRAC_PI_2, PI};
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::LightKind;
+use super::{LightKind, LocalPoint};
 use crate::blas::{Lattice, Root};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{self, Aabb, Cone, Triangle};
 use crate::receiver::{ReceiverKind, ShadingPoint};
-use crate::simd::prefetch;
 
 /// Largest coordinate of a vertex.
 ///
@@ -25,7 +24,8 @@ pub(crate) struct LightTriangle {
     pub(crate) vertices: [[f32; 3]; 3],
     /// The tree over its texture.
     pub(crate) root: Root,
-    /// Number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`].
+    /// Number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`]. With [`Self::LAMP`], all of
+    /// this is the record of a lamp.
     pub(crate) index_and_flags: u32,
 }
 
@@ -36,10 +36,18 @@ impl LightTriangle {
     pub(crate) const TWO_SIDED: u32 = 1 << 31;
     /// Marks a triangle that shows the environment behind it. *Format.*
     pub(crate) const PORTAL: u32 = 1 << 30;
+    /// Marks the record of a lamp, which is as large as that of a triangle. *Format*: numbers of lights stay below it.
+    pub(crate) const LAMP: u32 = 1 << 29;
 
     #[inline]
     pub(crate) fn triangle(&self) -> Triangle {
         Triangle(self.vertices.map(Vec3::from))
+    }
+
+    /// Returns the triangle's number among all that were added.
+    #[inline]
+    pub(super) fn index(&self) -> u32 {
+        self.index_and_flags & !(Self::TWO_SIDED | Self::PORTAL)
     }
 
     /// Whether the numbers, which may come from outside, are those of a triangle.
@@ -56,11 +64,6 @@ impl LightTriangle {
 }
 
 impl LightKind for LightTriangle {
-    #[inline]
-    fn index(&self) -> u32 {
-        self.index_and_flags & !(Self::TWO_SIDED | Self::PORTAL)
-    }
-
     #[inline]
     fn is_portal(&self) -> bool {
         self.index_and_flags & Self::PORTAL != 0
@@ -89,6 +92,7 @@ impl LightKind for LightTriangle {
         let bounds = LightBounds {
             aabb: Aabb::around(&triangle.0),
             normals: Cone::single(normal),
+            emission: FRAC_PI_2,
             flux: if directional { 0.0 } else { energy },
             portal: if directional { energy } else { 0.0 },
             two_sided: self.is_two_sided(),
@@ -112,13 +116,8 @@ impl LightKind for LightTriangle {
     }
 
     #[inline]
-    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<Lattice> {
+    fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         let vertices = self.triangle().exactly_relative_to(origin);
-        geometry::intersect(vertices, direction).map(Lattice::from_barycentrics)
-    }
-
-    #[inline(always)]
-    fn prefetch(&self) {
-        prefetch(self);
+        geometry::intersect(vertices, direction).map(|b| LocalPoint::on_triangle(Lattice::from_barycentrics(b)))
     }
 }

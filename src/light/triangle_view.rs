@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::cell_kernel::CellDescent;
 use super::linear_density::LinearDensity;
 use super::spherical_grid::{GridCell, SphericalGrid};
-use super::{DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind};
+use super::{DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind, LocalPoint};
 use crate::blas::{CellNode, Draw, Follow, Guide, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{DirectionCone, EnvironmentView};
 use crate::geometry;
@@ -76,15 +76,17 @@ pub(crate) struct TriangleView<'a> {
 }
 
 impl<'a> TriangleView<'a> {
-    /// Returns the view from a shading point, or `None` where nothing can arrive.
+    /// Returns the view from a shading point, or `None` where nothing can arrive. `wrap` makes the view into what is wanted
+    /// before it is written anywhere: a view is large.
     #[inline]
-    pub(super) fn new(
+    pub(super) fn wrapped<V>(
         light: &LightTriangle,
         x: &ShadingPoint,
         illumination: Illumination,
         cells: &'a [CellNode],
         environment: Option<&'a EnvironmentView<'a>>,
-    ) -> Option<Self> {
+        wrap: impl FnOnce(Self) -> V,
+    ) -> Option<V> {
         // NaN fails.
         let is_near = x.position.to_array().iter().all(|x| x.abs() <= FARTHEST_POINT);
         let triangle = light.triangle();
@@ -100,7 +102,7 @@ impl<'a> TriangleView<'a> {
         let [a, b, c] = vertices;
         let center = (a + b + c) * (1.0 / 3.0);
         let receiver_normal = x.receiver.normal();
-        Some(Self {
+        Some(wrap(Self {
             receiver: x.receiver,
             vertices,
             radius2: vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared())),
@@ -117,7 +119,7 @@ impl<'a> TriangleView<'a> {
             environment: environment.filter(|_| light.is_portal()),
             root: light.root,
             cells,
-        })
+        }))
     }
 
     /// Returns the vertices relative to the shading point.
@@ -135,6 +137,14 @@ impl<'a> TriangleView<'a> {
         geometry::intersect(self.exact_vertices, direction).map(Lattice::from_barycentrics)
     }
 
+    /// Returns a point relative to the shading point, in double precision, as it may be much nearer than the vertices.
+    #[inline]
+    pub(crate) fn position(&self, point: Lattice) -> DVec3 {
+        let [b1, b2] = point.to_barycentrics().map(f64::from);
+        let [v0, v1, v2] = self.exact_vertices;
+        v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2
+    }
+
     /// Descends to a cell of about constant density. Returns it with its probability.
     #[inline(always)]
     fn descend(&self, guide: &mut impl Guide) -> Option<(LatticeCell, f64)> {
@@ -146,7 +156,7 @@ impl<'a> TriangleView<'a> {
     #[inline]
     fn pdf_in(&self, cell: LatticeCell, cell_pmf: f64, point: Lattice) -> Option<f64> {
         let pdf_area = cell_pmf / (f64::from(self.area) * f64::from(cell.area()));
-        let pdf = pdf_area / self.solid_angle_per_area(self.point(point));
+        let pdf = pdf_area / self.solid_angle_per_area(self.position(point));
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
 
@@ -197,11 +207,13 @@ impl LightViewKind for TriangleView<'_> {
         let mut draw = Draw::new(u);
         let (cell, cell_pmf) = self.descend(&mut draw)?;
         let point = draw.point(cell);
-        Some(DrawnPoint { point, relative: self.point(point), pdf: self.pdf_in(cell, cell_pmf, point)? })
+        let pdf = self.pdf_in(cell, cell_pmf, point)?;
+        Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative: self.position(point), pdf })
     }
 
     #[inline]
-    fn pdf(&self, point: Lattice) -> Option<f64> {
+    fn pdf(&self, point: LocalPoint) -> Option<f64> {
+        let point = point.lattice();
         if self.is_plain() {
             if let Some(density) = LinearDensity::new(self) {
                 return density.pdf(self, point);
@@ -214,16 +226,18 @@ impl LightViewKind for TriangleView<'_> {
         self.pdf_in(cell, cell_pmf, point)
     }
 
-    /// Returns a point in double precision, as it may be much nearer than the vertices.
     #[inline]
-    fn point(&self, point: Lattice) -> DVec3 {
-        let [b1, b2] = point.to_barycentrics().map(f64::from);
-        let [v0, v1, v2] = self.exact_vertices;
-        v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2
+    fn point(&self, point: LocalPoint) -> DVec3 {
+        self.position(point.lattice())
     }
 
     #[inline]
-    fn normal(&self) -> Vec3 {
+    fn direction(&self, _point: LocalPoint, relative: DVec3, distance: f64) -> Vec3 {
+        (relative / distance).as_vec3()
+    }
+
+    #[inline]
+    fn normal(&self, _point: DVec3) -> Vec3 {
         self.normal
     }
 
@@ -233,7 +247,7 @@ impl LightViewKind for TriangleView<'_> {
         self.exact_height / (distance2 * math::sqrt64(distance2))
     }
 
-    fn irradiance(&self, scale: f32) -> f32 {
+    fn irradiance(&self, weight: f32) -> f32 {
         let radiance = self.environment.map_or(1.0, |environment| {
             let [a, b, c] = self.vertices;
             let center = (a + b + c) * (1.0 / 3.0);
@@ -246,7 +260,7 @@ impl LightViewKind for TriangleView<'_> {
             };
             environment.estimate_radiance(&cone).value
         });
-        PI * self.root.average * scale * self.estimate(LatticeCell::whole()) * radiance
+        PI * weight * self.estimate(LatticeCell::whole()) * radiance
     }
 }
 
@@ -276,9 +290,9 @@ fn sample_grid(view: &TriangleView<'_>, grid: &SphericalGrid<'_>, u: [Variate; 2
     let (direction, cell, pdf) = grid.draw(u)?;
     let (barycentrics, _) = geometry::cross_plane(view.exact_vertices, direction)?;
     let point = Lattice::inside(barycentrics);
-    let relative = view.point(point);
+    let relative = view.position(point);
     let pdf = density(view, grid, relative, Some((cell, pdf)))?;
-    Some(DrawnPoint { point, relative, pdf })
+    Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative, pdf })
 }
 
 /// Draws a point so near that neighbors of the lattice are seen in very different directions: one direction is as likely as
@@ -287,7 +301,7 @@ fn sample_grid(view: &TriangleView<'_>, grid: &SphericalGrid<'_>, u: [Variate; 2
 fn sample_uniformly(view: &TriangleView<'_>, grid: &SphericalGrid<'_>, u: [Variate; 2]) -> Option<DrawnPoint> {
     let direction = grid.draw_uniformly(u);
     let (barycentrics, distance) = geometry::cross_plane(view.exact_vertices, direction)?;
-    let point = Lattice::inside(barycentrics);
+    let point = LocalPoint::on_triangle(Lattice::inside(barycentrics));
     Some(DrawnPoint { point, relative: direction * distance, pdf: grid.uniform_pdf() })
 }
 
@@ -304,7 +318,7 @@ impl Kernel for PdfOfDirection<'_, '_> {
     fn run(self) -> Self::Output {
         let Self { view, point } = self;
         let grid = SphericalGrid::new(view)?;
-        let relative = view.point(point);
+        let relative = view.position(point);
         if !view.resolves_directions() {
             return Some((!view.is_below_horizon(relative)).then(|| grid.uniform_pdf()));
         }

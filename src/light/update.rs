@@ -1,18 +1,44 @@
 //! Lights that move or change their brightness.
 
+use alloc::vec::Vec;
+
 use glam::Vec3;
 
 use super::mesh::{MeshUpdate, check_triangles};
-use super::{Lights, NO_AREA};
+use super::{Lamp, LampRecord, LightKind, Lights, NO_AREA};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
 use crate::geometry::Triangle;
+use crate::record::LightId;
 
 impl Lights {
     /// Applies updates, or none of them if one is invalid.
     pub(crate) fn update(&mut self, updates: &[MeshUpdate<'_>]) -> Result<(), Error> {
         updates.iter().try_for_each(|update| self.check(update))?;
         updates.iter().for_each(|update| self.apply(update));
+        Ok(())
+    }
+
+    /// Replaces lamps by others, or none of them if one is invalid.
+    pub(crate) fn update_lamps(&mut self, updates: &[(LightId, Lamp)]) -> Result<(), Error> {
+        let first = self.meshes.last().map_or(0, |&end| end as usize);
+        let count = self.leaf_of.len() - first;
+        let replace = |&(LightId(light), lamp): &(LightId, Lamp)| {
+            let light = light as usize;
+            let &leaf =
+                self.leaf_of[first..].get(light).ok_or(Error(ErrorKind::UnknownLight { light, lights: count }))?;
+            let record = lamp.record(light as u32)?;
+            match self.records.get(leaf as usize) {
+                None if record.weight() > 0.0 => Err(Error(ErrorKind::RevivedLight { light })),
+                _ => Ok((leaf, record)),
+            }
+        };
+        let replaced: Vec<(u32, LampRecord)> = updates.iter().map(replace).collect::<Result<_, _>>()?;
+        for (leaf, record) in replaced {
+            if let Some(place) = self.records.get_mut(leaf as usize) {
+                *place = record.into_triangle();
+            }
+        }
         Ok(())
     }
 
@@ -40,7 +66,7 @@ impl Lights {
             }
         }
         let Some(scale) = update.scale else { return Ok(()) };
-        let average = |leaf: &u32| self.triangles.get(*leaf as usize).map_or(0.0, |light| light.root.average);
+        let average = |leaf: &u32| self.records.get(*leaf as usize).map_or(0.0, |light| light.root.average);
         let brightest = leaves.iter().map(average).fold(1.0, f32::max);
         match [scale, scale * brightest].into_iter().find(|value| !(0.0..=blas::MAX_AVERAGE).contains(value)) {
             Some(value) => Err(Error(ErrorKind::Weight { mesh, value, limit: blas::MAX_AVERAGE })),
@@ -53,7 +79,7 @@ impl Lights {
         let range = self.range(mesh);
         if let Some((positions, indices)) = update.triangles {
             for (&leaf, &indices) in self.leaf_of[range].iter().zip(indices) {
-                if let Some(light) = self.triangles.get_mut(leaf as usize) {
+                if let Some(light) = self.records.get_mut(leaf as usize) {
                     light.vertices = triangle(positions, indices).0.map(Vec3::into);
                 }
             }

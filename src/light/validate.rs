@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::{LightKind, LightsView, NO_AREA};
+use super::{Light, LightsView, NO_AREA};
 use crate::blas;
 use crate::error::Error;
 
@@ -10,7 +10,9 @@ impl LightsView<'_> {
     /// Checks that no lookup can leave a buffer, go around in circles or meet a number that is not finite.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         blas::validate(self.cells)?;
-        let roots: Vec<blas::Root> = self.triangles.iter().map(|triangle| triangle.root).collect();
+        let triangle = |record| Light::of(record).triangle();
+        let roots: Vec<blas::Root> = self.records.iter().filter_map(triangle).map(|triangle| triangle.root).collect();
+        Error::unless_equal("mark of lamps", self.has_lamps.into(), (roots.len() < self.records.len()).into())?;
         blas::validate_roots(&roots, self.cells)?;
         self.validate_leaves()?;
         Error::unless_equal("start of the first mesh", self.meshes.first().map_or(0, |&start| start as usize), 0)?;
@@ -22,21 +24,32 @@ impl LightsView<'_> {
         let bad_scale = self.scales.iter().position(|scale| !(0.0..=blas::MAX_AVERAGE).contains(scale));
         bad_scale.map_or(Ok(()), |i| Err(Error::bytes("scale of mesh", i, self.scales[i].to_bits(), 0u64)))?;
         let end = self.meshes.last().map_or(usize::MAX, |&end| end as usize);
-        Error::unless_equal("end of the meshes", end, self.leaf_of.len())
+        if end <= self.leaf_of.len() {
+            Ok(())
+        } else {
+            Err(Error::bytes("end of the meshes", 0, end, self.leaf_of.len()))
+        }
     }
 
-    /// Checks that leaves and triangles refer to each other, so that the density of a sample is looked up under the id that
+    /// Checks that leaves and lights refer to each other, so that the density of a sample is looked up under the id that
     /// the sample came with.
     fn validate_leaves(&self) -> Result<(), Error> {
-        for (i, triangle) in self.triangles.iter().enumerate() {
-            let leaf = self.leaf_of.get(triangle.index() as usize);
-            if !triangle.is_valid() || leaf.is_none_or(|&leaf| leaf as usize != i) {
-                return Err(Error::bytes("triangle", i, triangle.index(), self.leaf_of.len()));
+        let lamp_start = self.meshes.last().copied().unwrap_or(0);
+        // The number of a light among all that were added, if it is valid.
+        let index = |leaf: u32| match self.light(leaf) {
+            Light::Triangle(triangle) => {
+                Some(triangle.index()).filter(|&index| triangle.is_valid() && index < lamp_start)
+            }
+            Light::Lamp(lamp) => lamp_start.checked_add(lamp.number()).filter(|_| lamp.is_valid()),
+        };
+        for leaf in 0..self.len() as u32 {
+            if index(leaf).and_then(|index| self.leaf_of.get(index as usize)) != Some(&leaf) {
+                return Err(Error::bytes("triangle or lamp", leaf as usize, 0, self.leaf_of.len()));
             }
         }
-        for (index, &leaf) in self.leaf_of.iter().enumerate().filter(|(_, leaf)| **leaf < NO_AREA) {
-            if self.triangles.get(leaf as usize).is_none_or(|triangle| triangle.index() as usize != index) {
-                return Err(Error::bytes("leaf of triangle", index, leaf, self.triangles.len()));
+        for (i, &leaf) in self.leaf_of.iter().enumerate().filter(|(_, leaf)| **leaf < NO_AREA) {
+            if leaf as usize >= self.len() || index(leaf).is_none_or(|index| index as usize != i) {
+                return Err(Error::bytes("leaf of triangle or lamp", i, leaf, self.len()));
             }
         }
         Ok(())

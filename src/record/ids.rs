@@ -37,6 +37,25 @@ impl TextureId {
     }
 }
 
+/// A light that was added to a builder and is not made of triangles ([`Lamp`](crate::Lamp)). These lights are numbered from 0
+/// in the order in which they are added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LightId(pub(crate) u32);
+
+impl LightId {
+    /// Returns the id of the light with this number.
+    #[must_use]
+    pub const fn from_index(index: u32) -> Self {
+        Self(index)
+    }
+
+    /// Returns the number of the light.
+    #[must_use]
+    pub const fn index(self) -> u32 {
+        self.0
+    }
+}
+
 /// One triangle of one mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]

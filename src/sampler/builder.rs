@@ -7,10 +7,10 @@ use super::lights::LightSampler;
 use crate::blas::{Procedural, Texture};
 use crate::env::{Environment, RegionMoments};
 use crate::error::Error;
-use crate::light::{Energies, Illumination, LightCollection, Mesh};
+use crate::light::{Energies, Illumination, Lamp, LightCollection, Mesh};
 use crate::parallel;
 use crate::progress::{Progress, Report};
-use crate::record::{MeshId, TextureId};
+use crate::record::{LightId, MeshId, TextureId};
 use crate::tlas::{self, Arity};
 
 /// Share of the time that lights take after which all of them have found their place; the rest is the collapse and the
@@ -53,7 +53,7 @@ pub struct LightSamplerBuilder<'a> {
 impl fmt::Debug for LightSamplerBuilder<'_> {
     /// Shows how much has been added.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [textures, meshes, triangles] = self.collection.counts();
+        let [textures, meshes, triangles, lights] = self.collection.counts();
         f.debug_struct("LightSamplerBuilder")
             .field("arity", &self.arity)
             .field("environment", &self.environment)
@@ -62,6 +62,7 @@ impl fmt::Debug for LightSamplerBuilder<'_> {
             .field("textures", &textures)
             .field("meshes", &meshes)
             .field("triangles", &triangles)
+            .field("lights", &lights)
             .finish()
     }
 }
@@ -140,6 +141,16 @@ impl<'a> LightSamplerBuilder<'a> {
         Ok(self)
     }
 
+    /// Adds a light that is not made of triangles, in one expression. These lights are numbered from 0.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::add_light`].
+    pub fn light(mut self, light: impl Into<Lamp>) -> Result<Self, Error> {
+        self.add_light(light)?;
+        Ok(self)
+    }
+
     /// Adds a texture that meshes can refer to. Its texels are read until the builder is built.
     pub fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
         self.collection.add_texture(texture)
@@ -161,11 +172,21 @@ impl<'a> LightSamplerBuilder<'a> {
         self.collection.add_mesh(mesh)
     }
 
-    /// Builds the trees over textures, and the tree over all triangles that can emit light.
+    /// Adds a light that is not made of triangles: see [`Lamp`]. After an error the builder is as it was before.
     ///
     /// # Errors
     ///
-    /// If there are more triangles than the tree can number (2^28 - 1), or more cells of textures (2^34).
+    /// If a number is not finite, the light reaches beyond a coordinate of 1e9, a length is not positive, or a radiance or an
+    /// intensity is negative or above 1e30.
+    pub fn add_light(&mut self, light: impl Into<Lamp>) -> Result<LightId, Error> {
+        self.collection.add_lamp(light.into())
+    }
+
+    /// Builds the trees over textures, and the tree over all lights that can emit.
+    ///
+    /// # Errors
+    ///
+    /// If there are more lights than the tree can number (2^28 - 1), or more cells of textures (2^34).
     pub fn build(self) -> Result<LightSampler, Error> {
         self.build_reporting(None)
     }
@@ -187,7 +208,7 @@ impl<'a> LightSamplerBuilder<'a> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
         let energies = Energies::new(&environment, &[], &[]);
         let mut collection = self.collection;
-        let work = collection.image_work() + collection.triangle_count() as f64 / PLACED;
+        let work = collection.image_work() + collection.light_count() as f64 / PLACED;
         let progress = Progress::new(report, work);
         collection.build_images(&progress)?;
         let emitting = collection.emitting(&energies)?;

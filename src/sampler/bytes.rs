@@ -31,7 +31,7 @@ struct Parameters {
     /// Whether the environment is a light: then its regions follow.
     has_sky: u32,
     is_crossed_once: u32,
-    padding: u32,
+    has_lamps: u32,
 }
 
 const _: () = assert!(size_of::<Parameters>() == 32);
@@ -58,7 +58,7 @@ impl<'a> LightSamplerView<'a> {
             has_portals: lights.has_portals.into(),
             has_sky: sky.is_some().into(),
             is_crossed_once: lights.is_crossed_once.into(),
-            padding: 0,
+            has_lamps: lights.has_lamps.into(),
         }];
         let mut sections = Vec::new();
         sections.push(Section::new(Parameters::TAG, Parameters::VERSION, &parameters));
@@ -82,7 +82,14 @@ impl<'a> LightSamplerView<'a> {
         let mut sections = Sections::new(bytes)?;
         let parameters: Parameters = sections.take_value(Parameters::TAG, Parameters::VERSION, "parameters")?;
         let Parameters {
-            light_arity, texture_arity, illumination, energy, has_portals, has_sky, is_crossed_once, ..
+            light_arity,
+            texture_arity,
+            illumination,
+            energy,
+            has_portals,
+            has_sky,
+            is_crossed_once,
+            has_lamps,
         } = parameters;
         if texture_arity as usize != blas::ARITY {
             let expected = const { &[blas::ARITY as u32] };
@@ -91,6 +98,7 @@ impl<'a> LightSamplerView<'a> {
         Error::unless_equal("mark of portals", (has_portals & !1) as usize, 0)?;
         Error::unless_equal("mark of the environment", (has_sky & !1) as usize, 0)?;
         Error::unless_equal("mark of single crossings", (is_crossed_once & !1) as usize, 0)?;
+        Error::unless_equal("mark of lamps", (has_lamps & !1) as usize, 0)?;
         let arity = Arity::from_code(light_arity).ok_or_else(|| {
             let expected = const { &[Arity::Four.code(), Arity::Eight.code(), Arity::Sixteen.code()] };
             Error(ErrorKind::Arity { what: "the tree over the lights", found: light_arity, expected })
@@ -101,8 +109,14 @@ impl<'a> LightSamplerView<'a> {
             return Err(Error::bytes("energy", 0, energy.to_bits(), 0u64));
         }
         let tlas = TlasView::from_sections(&mut sections, arity)?;
-        let lights =
-            LightsView::from_sections(&mut sections, illumination, energy, has_portals != 0, is_crossed_once != 0)?;
+        let lights = LightsView::from_sections(
+            &mut sections,
+            illumination,
+            energy,
+            has_portals != 0,
+            has_lamps != 0,
+            is_crossed_once != 0,
+        )?;
         let environment = EnvironmentView::from_all_sections(&mut sections)?;
         let sky = if has_sky == 0 { None } else { Some(take_regions(&mut sections)?) };
         sections.end()?;

@@ -3,17 +3,16 @@
 //! A photon's density is per area perpendicular to its direction and per solid angle, the measure in which radiance
 //! is power. So the power that it carries is radiance (times transmittance) over density.
 
-use core::f32::consts::{FRAC_1_PI, PI, TAU};
+use core::f32::consts::PI;
 
 use glam::Vec3;
 
 use super::finite::{to_finite, to_positive};
 use super::lights::LightSamplerView;
-use crate::blas::Lattice;
 use crate::env::DirectionDistribution;
-use crate::light::{EmissionStart, Light, LightKind};
+use crate::light::{EmissionStart, EmittedRay, Light, LightKind, LightPoint, LocalPoint};
 use crate::math;
-use crate::record::Hit;
+use crate::record::{Hit, LightId, SampledLight};
 use crate::technique::LightScene;
 use crate::tlas::{Beam, Outgoing};
 use crate::warp::{Variate, pick_pair, seed};
@@ -22,28 +21,45 @@ use crate::warp::{Variate, pick_pair, seed};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct EmissionSample {
-    /// Point on the lights that the ray starts from.
-    pub hit: Hit,
-    /// World position of that point.
+    /// What the ray starts from: a point of a triangle, or another light.
+    pub light: SampledLight,
+    /// World position that the ray starts from.
     pub position: Vec3,
-    /// Unit normal of the triangle's front side.
+    /// Unit normal of the front side there. For a light without an extent, the direction.
     pub normal: Vec3,
     /// Unit direction in which the light travels.
     pub direction: Vec3,
     /// Density of the ray, finite and above zero: per area perpendicular to `direction` and, unless the direction was
-    /// given, per solid angle.
+    /// given, per solid angle. For a light without an extent, per solid angle alone: there intensity over density is the
+    /// power.
     ///
-    /// It counts this triangle alone; [`Emission::pdf_ray`] counts all that the ray passes.
+    /// It counts this light alone; [`Emission::pdf_ray`] counts all that the ray passes.
     pub pdf: f32,
-    /// Probability of having chosen the triangle, given the direction for a portal. In `(0, 1]`.
+    /// Probability of having chosen the light, given the direction for a portal. In `(0, 1]`.
     pub pmf: f32,
+}
+
+impl EmissionSample {
+    /// Returns the point of the triangle that the ray starts from; `None` for any other kind of light.
+    #[inline]
+    #[must_use]
+    pub const fn hit(&self) -> Option<Hit> {
+        self.light.hit()
+    }
+
+    /// Whether the light has an extent. Of a light without one, `pdf` is a density per solid angle alone.
+    #[inline]
+    #[must_use]
+    pub const fn has_extent(&self) -> bool {
+        self.light.has_extent()
+    }
 }
 
 /// Draws the rays in which light leaves all lights of a scene, for photon maps, light tracing and bidirectional
 /// methods.
 ///
 /// What does not depend on the direction it is seen from (emitters, and portals to a constant environment) is drawn by
-/// its power, with cosine-distributed directions. For portals to an image, a direction is drawn by radiance times the
+/// its power, with cosine-distributed directions from surfaces, and uniform ones from lights without an extent. For portals to an image, a direction is drawn by radiance times the
 /// area that all portals turn towards it, then a point by transmittance and that area.
 ///
 /// An environment that is a light itself ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)) sends no
@@ -118,9 +134,20 @@ impl<'a> Emission<'a> {
     pub fn pdf(&self, hit: &Hit, direction: Vec3) -> f32 {
         let density = self.scene.lights.leaf(hit.triangle).map_or(0.0, |leaf| {
             let directions = self.directions.pdf(&self.scene.environment, -direction);
-            self.density(leaf, Lattice::from_barycentrics(hit.barycentrics), direction, directions)
+            self.density(LightPoint::new(leaf, hit.barycentrics), direction, directions)
         });
         to_finite(density)
+    }
+
+    /// Returns the density with which [`Self::sample`] draws a ray from a light that is not made of triangles, in a unit
+    /// direction in which light travels: per solid angle and, if the light has an extent, per area perpendicular to the
+    /// direction. Zero where it cannot. Which of its points the ray starts from makes no difference, if light leaves it in
+    /// that direction.
+    #[must_use]
+    pub fn pdf_light(&self, light: LightId, direction: Vec3) -> f32 {
+        let leaf = self.scene.lights.leaf_of_lamp(light);
+        let density = |leaf| self.density(LightPoint { leaf, point: LocalPoint::NONE }, direction, 0.0);
+        to_finite(leaf.map_or(0.0, density))
     }
 
     /// Returns the density with which [`Self::sample`] draws a ray that arrives at a point from a unit direction `towards`
@@ -134,10 +161,14 @@ impl<'a> Emission<'a> {
     /// Returns [`Self::pdf_ray`] of a ray that [`Self::sample`] has drawn, at the point where it has landed.
     ///
     /// The point that the ray started from counts with its own density whatever rounding does to the line, so the result is
-    /// never below `ray.pdf`. A ray that starts at a triangle's edge could miss it on the way back.
+    /// never below `ray.pdf`. A ray that starts at a triangle's edge could miss it on the way back. For a ray from a light
+    /// without an extent the result is `ray.pdf`.
     #[must_use]
     pub fn pdf_sample_ray(&self, ray: &EmissionSample, landed: Vec3) -> f32 {
-        let own = self.scene.lights.leaf(ray.hit.triangle);
+        if !ray.has_extent() {
+            return ray.pdf;
+        }
+        let own = self.scene.lights.leaf_of_sampled(&ray.light);
         to_finite(f64::from(ray.pdf) + self.ray_density(landed, -ray.direction, own))
     }
 
@@ -149,7 +180,7 @@ impl<'a> Emission<'a> {
             position,
             towards,
             |leaf| Some(leaf) != except,
-            |leaf, point| density += self.density(leaf, point, -towards, directions),
+            |point| density += self.density(point, -towards, directions),
         );
         density
     }
@@ -158,34 +189,37 @@ impl<'a> Emission<'a> {
     /// draws a point of a portal. Zero where it cannot.
     #[must_use]
     pub fn pdf_distant(&self, direction: Vec3, hit: &Hit) -> f32 {
-        let point = Lattice::from_barycentrics(hit.barycentrics);
         let leaf = self.scene.lights.leaf(hit.triangle);
-        to_finite(leaf.map_or(0.0, |leaf| self.beam_density(leaf, point, direction)))
+        to_finite(leaf.map_or(0.0, |leaf| self.beam_density(LightPoint::new(leaf, hit.barycentrics), direction)))
     }
 
-    fn density(&self, leaf: u32, point: Lattice, direction: Vec3, directions: f64) -> f64 {
-        if is_directional(&self.scene, self.scene.lights.light(leaf)) {
-            self.shares[1] * directions * self.beam_density(leaf, point, direction)
+    fn density(&self, point: LightPoint, direction: Vec3, directions: f64) -> f64 {
+        if is_directional(&self.scene, self.scene.lights.light(point.leaf)) {
+            self.shares[1] * directions * self.beam_density(point, direction)
         } else {
-            self.diffuse_density(leaf, point, direction)
+            self.diffuse_density(point, direction)
         }
     }
 
     fn sample_diffuse(&self, mut u: Variate, point: [Variate; 2], direction: [Variate; 2]) -> Option<EmissionSample> {
         let (leaf, pmf) = self.scene.tlas.sample_outgoing(&Outgoing::Diffuse, &mut u)?;
-        let start = self.scene.lights.sample_start(leaf, point)?;
-        let side = if start.two_sided && u.value() < 0.5 { -start.normal } else { start.normal };
-        let pdf = self.shares[0] * pmf * start.pdf_area * per_direction(start.two_sided);
-        Some(self.ray(leaf, &start, cosine_direction(side, direction), pdf, pmf))
+        let EmittedRay { point, position, normal, direction, pdf } =
+            self.scene.lights.emit(leaf, point, direction, u.value())?;
+        (pdf > 0.0).then(|| EmissionSample {
+            light: self.scene.lights.sampled(LightPoint { leaf, point }),
+            position: position.as_vec3(),
+            normal,
+            direction,
+            pdf: to_positive(self.shares[0] * pmf * pdf),
+            pmf: to_positive(pmf),
+        })
     }
 
-    fn diffuse_density(&self, leaf: u32, point: Lattice, direction: Vec3) -> f64 {
-        let Some(start) = self.scene.lights.start_at(leaf, point) else { return 0.0 };
-        if !start.two_sided && start.normal.dot(direction) <= 0.0 {
-            return 0.0;
+    fn diffuse_density(&self, point: LightPoint, direction: Vec3) -> f64 {
+        match self.scene.lights.emission_pdf(point, direction) {
+            0.0 => 0.0,
+            pdf => self.shares[0] * self.scene.tlas.pmf_outgoing(point.leaf, &Outgoing::Diffuse) * pdf,
         }
-        let pmf = self.scene.tlas.pmf_outgoing(leaf, &Outgoing::Diffuse);
-        self.shares[0] * pmf * start.pdf_area * per_direction(start.two_sided)
     }
 
     fn sample_beam(
@@ -199,10 +233,18 @@ impl<'a> Emission<'a> {
         let (leaf, pmf) = self.scene.tlas.sample_outgoing(&beam, &mut u)?;
         let start = self.scene.lights.sample_start(leaf, point)?;
         let cosine = self.beam_cosine(leaf, &start, direction)?;
-        Some(self.ray(leaf, &start, direction, direction_pdf * pmf * start.pdf_area / cosine, pmf))
+        let point = LightPoint { leaf, point: LocalPoint::on_triangle(start.point) };
+        Some(EmissionSample {
+            light: self.scene.lights.sampled(point),
+            position: start.position.as_vec3(),
+            normal: start.normal,
+            direction,
+            pdf: to_positive(direction_pdf * pmf * start.pdf_area / cosine),
+            pmf: to_positive(pmf),
+        })
     }
 
-    fn beam_density(&self, leaf: u32, point: Lattice, direction: Vec3) -> f64 {
+    fn beam_density(&self, LightPoint { leaf, point }: LightPoint, direction: Vec3) -> f64 {
         let Some(start) = self.scene.lights.start_at(leaf, point) else { return 0.0 };
         let Some(cosine) = self.beam_cosine(leaf, &start, direction) else { return 0.0 };
         let beam = beam(&self.scene, direction, [0.0, 1.0]);
@@ -217,17 +259,6 @@ impl<'a> Emission<'a> {
         let cosine = start.normal.as_dvec3().dot(direction.as_dvec3());
         let cosine = if start.two_sided { cosine.abs() } else { cosine };
         (cosine > 0.0).then_some(cosine)
-    }
-
-    fn ray(&self, leaf: u32, start: &EmissionStart, direction: Vec3, pdf: f64, pmf: f64) -> EmissionSample {
-        EmissionSample {
-            hit: Hit { triangle: self.scene.lights.id(leaf), barycentrics: start.point.to_barycentrics() },
-            position: start.position.as_vec3(),
-            normal: start.normal,
-            direction,
-            pdf: to_positive(pdf),
-            pmf: to_positive(pmf),
-        }
     }
 }
 
@@ -264,20 +295,4 @@ fn is_directional(scene: &LightScene<'_>, light: Light<'_>) -> bool {
 fn variates<const D: usize>(u: [f32; D]) -> [Variate; D] {
     let salt = seed(&u);
     core::array::from_fn(|i| Variate::new(u[i], salt ^ i as u64))
-}
-
-/// Density of cosine-distributed directions over the cosine: from one side, or evenly from two.
-fn per_direction(two_sided: bool) -> f64 {
-    f64::from(if two_sided { 0.5 * FRAC_1_PI } else { FRAC_1_PI })
-}
-
-/// Returns a direction around a unit normal with a density of its cosine over π (Malley's method; pbrt, section A.5.3).
-fn cosine_direction(normal: Vec3, u: [Variate; 2]) -> Vec3 {
-    let [u1, u2] = u.map(|u| u.value_f32());
-    let (sin_phi, cos_phi) = math::sin_cos(TAU * u2);
-    let radius = math::sqrt(u1);
-    // Never quite in the plane.
-    let height = math::sqrt(1.0 - u1).max(f32::EPSILON);
-    let (s, t) = normal.any_orthonormal_pair();
-    (s * (radius * cos_phi) + t * (radius * sin_phi) + normal * height).normalize()
 }

@@ -111,7 +111,7 @@ impl LightSampler {
         self.environment.set_rotation(rotation)
     }
 
-    /// Returns the number of triangles that can send light.
+    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them.
     #[must_use]
     pub fn light_count(&self) -> usize {
         self.as_view().light_count()
@@ -143,7 +143,7 @@ impl<'a> LightSamplerView<'a> {
         self.scene.environment
     }
 
-    /// Returns the number of triangles that can send light.
+    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them.
     #[must_use]
     pub fn light_count(&self) -> usize {
         self.scene.lights.len()

@@ -5,7 +5,6 @@ use smallvec::SmallVec;
 use super::lights::LightSamplerView;
 #[cfg(doc)]
 use super::point::PointSampler;
-use crate::light::LightKind;
 use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
 use crate::technique::{Variates, Viewpoint};
@@ -38,7 +37,7 @@ impl LightSamplerView<'_> {
         }
         self.scene.tlas.sample_many(&mut walks);
         for (leaf, _) in walks.iter().filter_map(Descent::leaf) {
-            self.scene.lights.light(leaf).prefetch();
+            self.scene.lights.prefetch(leaf);
         }
         let Some((first, _)) = queries.first() else { return };
         // Without these, nothing but the point differs.

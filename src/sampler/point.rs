@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::finite::{to_finite, to_positive};
 use crate::light::{LightPoint, LightView, LightViewKind};
 use crate::receiver::ShadingPoint;
-use crate::record::{Hit, LightSample, SampledLight, TriangleId};
+use crate::record::{Hit, LightId, LightSample, SampledLight, TriangleId};
 use crate::technique::{Drawn, Mixed, Mixture, SkyDirection, Variates, Viewpoint};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
@@ -109,6 +109,17 @@ impl<'a> PointSampler<'a> {
         self.pdf_of_hit(hit, &self.mixture().one())
     }
 
+    /// Returns the density per solid angle with which [`Self::sample`] draws the point that a ray in a unit direction meets of
+    /// a light that is not made of triangles. Zero where it cannot, and for a light without an extent, which no ray meets;
+    /// never infinite.
+    ///
+    /// That the ray meets the light is taken from the caller, whose own intersector has found it: rounding may take a
+    /// sampled direction past a small light.
+    #[must_use]
+    pub fn pdf_light(&self, light: LightId, direction: Vec3) -> f32 {
+        self.pdf_of_lamp(light, direction, &self.mixture().one())
+    }
+
     /// Returns the density per solid angle with which [`Self::sample`] draws this direction of the environment, where that is
     /// a light ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)). Zero where it cannot; never
     /// infinite. `direction` need not have unit length.
@@ -130,6 +141,13 @@ impl<'a> PointSampler<'a> {
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
     }
 
+    /// Returns the probability with which [`Self::sample`] chooses this light, which is not made of triangles, in `[0, 1]`.
+    #[must_use]
+    pub fn pmf_light(&self, light: LightId) -> f32 {
+        let leaf = self.at.scene.lights.leaf_of_lamp(light);
+        leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
+    }
+
     /// Returns the density per solid angle with which [`Self::sample`] goes in a direction: the sum over all points of all
     /// lights that the ray from the shading point crosses, which the crate finds by its own traversal, and the environment if
     /// it is a light. `direction` need not have unit length.
@@ -146,17 +164,16 @@ impl<'a> PointSampler<'a> {
     /// The sampled point counts with its own density whatever rounding does to the ray, so the result is never below
     /// `sample.pdf`. Only what else the ray crosses is followed down the trees, so this is faster as well. Where all lights
     /// lie side by side in one plane, or on the surface of one convex body and face into it, nothing else can be crossed, and
-    /// the result is `sample.pdf`.
+    /// the result is `sample.pdf`. So it is for a light without an extent, whose `sample.pdf` is a probability.
     #[must_use]
     pub fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
+        if !sample.has_extent() {
+            return sample.pdf;
+        }
         let mixture = self.mixture();
         let mixed = mixture.one();
-        let (own, environment) = match sample.light {
-            SampledLight::Triangle(hit) => {
-                (self.at.scene.lights.leaf(hit.triangle), self.environment_density(sample.direction, &mixed))
-            }
-            SampledLight::Environment => (None, 0.0),
-        };
+        let own = self.at.scene.lights.leaf_of_sampled(&sample.light);
+        let environment = own.map_or(0.0, |_| self.environment_density(sample.direction, &mixed));
         let is_alone = own.is_some() && self.at.scene.lights.is_crossed_once;
         let others = if is_alone { 0.0 } else { self.direction_density(sample.direction, own, &mixed) };
         to_finite(f64::from(sample.pdf) + others + environment)
@@ -206,6 +223,13 @@ impl<'a> PointSampler<'a> {
         self.pdf_of_hit(hit, &self.mixture().side_by_side(splitting))
     }
 
+    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at the point that a ray in a unit
+    /// direction meets of a light that is not made of triangles; see [`Self::pdf_light`].
+    #[must_use]
+    pub fn pdf_split_light(&self, light: LightId, direction: Vec3, splitting: &Splitting) -> f32 {
+        self.pdf_of_lamp(light, direction, &self.mixture().side_by_side(splitting))
+    }
+
     /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a direction of the environment,
     /// where that is a light.
     #[must_use]
@@ -230,6 +254,13 @@ impl<'a> PointSampler<'a> {
         to_finite(mixed.density(&self.at, LightPoint::new(leaf, hit.barycentrics), view))
     }
 
+    fn pdf_of_lamp(&self, light: LightId, direction: Vec3, mixed: &Mixed<'_>) -> f32 {
+        let Some(point) = self.at.scene.lights.point_of_lamp(light, direction) else { return 0.0 };
+        let view = &self.at.view(point.leaf);
+        let Some(view) = view else { return 0.0 };
+        to_finite(mixed.density(&self.at, point, view))
+    }
+
     /// Density of a direction by the environment as a light.
     fn environment_density(&self, direction: Vec3, mixed: &Mixed<'_>) -> f64 {
         if self.at.scene.sky.is_none() {
@@ -246,9 +277,9 @@ impl<'a> PointSampler<'a> {
             self.at.x.position,
             direction,
             |leaf| Some(leaf) != except,
-            |leaf, point| {
-                if let Some(view) = &self.at.view(leaf) {
-                    density += mixed.density(&self.at, LightPoint { leaf, point }, view);
+            |point| {
+                if let Some(view) = &self.at.view(point.leaf) {
+                    density += mixed.density(&self.at, point, view);
                 }
             },
         );
@@ -263,13 +294,10 @@ fn light_sample(at: &Viewpoint<'_>, drawn: &Drawn, view: &LightView<'_>) -> Opti
     let distance = relative.length();
     let positive = drawn.pdf > 0.0 && distance > 0.0 && distance.is_finite();
     positive.then(|| LightSample {
-        light: SampledLight::Triangle(Hit {
-            triangle: at.scene.lights.id(drawn.point.leaf),
-            barycentrics: drawn.point.point.to_barycentrics(),
-        }),
+        light: at.scene.lights.sampled(drawn.point),
         position: (at.x.position.as_dvec3() + relative).as_vec3(),
-        normal: view.normal(),
-        direction: (relative / distance).as_vec3(),
+        normal: view.normal(relative),
+        direction: view.direction(drawn.point.point, relative, distance),
         distance: distance as f32,
         pdf: to_positive(drawn.pdf),
         pdf_area: to_positive(drawn.pdf * view.solid_angle_per_area(relative)),

@@ -2,7 +2,8 @@
 
 use super::lights::LightSampler;
 use crate::error::Error;
-use crate::light::{Energies, MeshUpdate, storable};
+use crate::light::{Energies, Lamp, MeshUpdate, storable};
+use crate::record::LightId;
 
 impl LightSampler {
     /// Applies changes of meshes without a rebuild.
@@ -24,6 +25,23 @@ impl LightSampler {
     /// without area has become one with an area.
     pub fn refit(&mut self, updates: &[MeshUpdate<'_>]) -> Result<(), Error> {
         self.lights.update(updates)?;
+        self.fit();
+        Ok(())
+    }
+
+    /// Replaces lights that are not made of triangles, without a rebuild: by lights that have moved, have another brightness or
+    /// are of another kind. What holds of [`Self::refit`] holds of this.
+    ///
+    /// A light of a radiance or intensity of zero is never sampled, and comes back if it is replaced again.
+    ///
+    /// After an error the sampler is as it was before.
+    ///
+    /// # Errors
+    ///
+    /// If there is no such light, [`add_light`](crate::LightSamplerBuilder::add_light) would refuse the new one, or it emits
+    /// and the light that was added emitted nothing.
+    pub fn refit_lights(&mut self, updates: &[(LightId, Lamp)]) -> Result<(), Error> {
+        self.lights.update_lamps(updates)?;
         self.fit();
         Ok(())
     }

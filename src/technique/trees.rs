@@ -1,7 +1,7 @@
 //! The tree over the lights, then the tree over the texture of the one that was chosen.
 
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
-use crate::light::{DrawnPoint, LightPoint, LightView, LightViewKind};
+use crate::light::{DrawnPoint, LightKind, LightPoint, LightView, LightViewKind};
 use crate::math::{at_least, only_if};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::Variate;
@@ -79,5 +79,6 @@ pub(super) fn irradiance(at: &Viewpoint<'_>, first: Option<&FirstWeights>) -> f3
     if at.scene.lights.is_empty() {
         return 0.0;
     }
-    at.view(0).map_or(0.0, |view| view.irradiance(at.scene.lights.scale(0)))
+    let weight = || at.scene.lights.light(0).weight() * at.scene.lights.scale(0);
+    at.view(0).map_or(0.0, |view| view.irradiance(weight()))
 }

@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 
-use crate::blas::Lattice;
 use crate::env::{EnvironmentView, RegionMoments};
-use crate::light::{LightKind, LightView, LightsView};
+use crate::light::{LightKind, LightPoint, LightView, LightsView};
 use crate::math::{at_least, only_if};
 use crate::receiver::ShadingPoint;
 use crate::tlas::{LeafOracle, TlasView};
@@ -47,12 +46,12 @@ impl<'a> LightScene<'a> {
         origin: Vec3,
         direction: Vec3,
         mut is_wanted: impl FnMut(u32) -> bool,
-        mut visit: impl FnMut(u32, Lattice),
+        mut visit: impl FnMut(LightPoint),
     ) {
         self.tlas.cross(origin, direction, |leaf| {
             let point = if is_wanted(leaf) { self.lights.light(leaf).intersect(origin, direction) } else { None };
             if let Some(point) = point {
-                visit(leaf, point);
+                visit(LightPoint { leaf, point });
             }
         });
     }
@@ -89,6 +88,11 @@ impl LeafOracle for Viewpoint<'_> {
         // What is not black stays so, however bright the rest is.
         let relative = |value: f32| only_if(value > 0.0, at_least(value / mean, f32::MIN_POSITIVE));
         radiances.iter_mut().for_each(|radiance| *radiance = relative(*radiance));
+    }
+
+    #[inline(always)]
+    fn has_shaped_leaves(&self) -> bool {
+        self.scene.lights.has_lamps
     }
 
     #[inline]

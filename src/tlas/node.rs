@@ -5,6 +5,10 @@ use glam::Vec3;
 
 /// Bit of [`Node::normals`] that marks a two-sided light. *Format.*
 pub(super) const LANE_TWO_SIDED: u32 = 1 << 31;
+/// Bit of [`Node::normals`] that marks a child whose lights do not all send over the hemisphere around their normal. With
+/// [`WIDE`], some of them send in all directions. With any other code of [`Node::tangents`], all of them send into the cone of
+/// that code alone: the cone of normals, widened by the angle at which light leaves. *Format.*
+pub(super) const LANE_SHAPED: u32 = 1 << 30;
 /// Largest component of a normal, in the ten bits that it has. *Format.*
 pub(super) const NORMAL_STEPS: f32 = 511.0;
 /// Code of a cone of normals so wide that something always faces the shading point. *Format.*
@@ -33,7 +37,7 @@ pub(crate) struct Node<const N: usize> {
     /// The first child that is a leaf.
     pub(super) first_leaf: u32,
     /// Direction of the mean normal, which is the axis of the cone of normals as well: ten bits a component, and
-    /// [`LANE_TWO_SIDED`].
+    /// [`LANE_TWO_SIDED`] and [`LANE_SHAPED`].
     pub(super) normals: [u32; N],
     /// Energies; zero where there is no child.
     pub(super) energies: [u16; N],
@@ -153,6 +157,13 @@ impl<const N: usize> Node<N> {
         let tangent = root * root;
         let cos = 1.0 / crate::math::sqrt(1.0 + tangent * tangent);
         (axis, [tangent * cos, cos], mean)
+    }
+
+    /// Returns the lanes marked with [`LANE_SHAPED`], as a set of bits.
+    #[inline(always)]
+    pub(super) fn shaped_lanes(&self) -> u32 {
+        let normals = self.normals;
+        (0..N).fold(0, |set, lane| set | u32::from(normals[lane] & LANE_SHAPED != 0) << lane)
     }
 
     pub(super) fn is_two_sided(&self, lane: usize) -> bool {

@@ -50,6 +50,10 @@ impl LeafOracle for Before<'_> {
         radiances.fill(1.0);
     }
 
+    fn has_shaped_leaves(&self) -> bool {
+        false
+    }
+
     fn is_visible(&self, leaf: u32) -> bool {
         !self.odd_alone || leaf % 2 == 1
     }
@@ -78,6 +82,7 @@ fn cloud(n: usize, pcg: &mut Pcg32) -> Vec<BoundedLight> {
         let bounds = LightBounds {
             aabb: Aabb::around(&[center - corner, center + corner]),
             normals: Cone::single(normal),
+            emission: core::f32::consts::FRAC_PI_2,
             flux: if pcg.next_f32() < 0.5 { pcg.next_f32() } else { 0.0 },
             portal: pcg.next_f32(),
             two_sided: pcg.next_f32() < 0.2,

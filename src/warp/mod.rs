@@ -2,6 +2,9 @@
 
 pub(crate) mod discrete;
 pub(crate) mod equal_area;
+pub(crate) mod projected_cap;
+pub(crate) mod spherical_cap;
+pub(crate) mod spherical_ellipse;
 mod spherical_triangle;
 pub(crate) mod triangle;
 pub(crate) mod variate;

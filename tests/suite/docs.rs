@@ -9,6 +9,9 @@ use crate::layering::{files, is_word, without_comments};
 /// Names of other programs, of the language and of tools, which no file here defines or uses.
 const FOREIGN: [&str; 0] = [];
 
+/// How names of extensions of glTF begin, which the code has as texts alone.
+const EXTENSIONS: [&str; 2] = ["KHR_", "EXT_"];
+
 /// Folders whose Rust files define names.
 const CODE: [&str; 4] = ["src", "tests", "benches", "examples"];
 
@@ -23,11 +26,12 @@ fn is_name(word: &str) -> bool {
     let has_inner = |is: fn(char) -> bool| word.chars().skip(1).any(is);
     let is_camel = word.starts_with(|c: char| c.is_ascii_uppercase()) && has_inner(|c| c.is_ascii_lowercase());
     let is_split = word.trim_matches('_').contains('_') && word.is_ascii();
-    starts_well && (is_camel || is_split)
+    let is_extension = EXTENSIONS.iter().any(|prefix| word.starts_with(prefix));
+    starts_well && !is_extension && (is_camel || is_split)
 }
 
-/// Names in the code spans of a text in Markdown, each with its line. What is a path, an option or a name with hyphens is
-/// none. Blocks of code are left to the compiler.
+/// Names in the code spans of a text in Markdown, each with its line. What is a path, the ending of one, an option or a name
+/// with hyphens is none. Blocks of code are left to the compiler.
 fn names(text: &str) -> Vec<(usize, String)> {
     let mut found = Vec::new();
     let mut is_block = false;
@@ -39,7 +43,9 @@ fn names(text: &str) -> Vec<(usize, String)> {
             continue;
         }
         for span in line.split('`').skip(1).step_by(2) {
-            for part in span.split_whitespace().filter(|part| !part.contains(['/', '-', '=', '"'])) {
+            for part in
+                span.split_whitespace().filter(|part| !part.contains(['/', '-', '=', '"']) && !part.starts_with('.'))
+            {
                 let chars: Vec<char> = part.chars().collect();
                 let mut i = 0;
                 while i < chars.len() {

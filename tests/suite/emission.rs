@@ -9,7 +9,7 @@ use crate::common::pcg::Pcg32;
 use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky};
 use crate::common::statistics::Mean;
 use crate::common::tier::some;
-use fanlight::{Arity, Emission, EmissionSample, Filter, ShadingPoint};
+use fanlight::{Arity, Emission, EmissionSample, Filter, Hit, ShadingPoint};
 use glam::Vec3;
 
 const SCENES: usize = 16;
@@ -24,6 +24,10 @@ fn random<const D: usize>(pcg: &mut Pcg32) -> [f32; D] {
     core::array::from_fn(|_| pcg.f32())
 }
 
+fn hit(ray: &EmissionSample) -> Hit {
+    ray.hit().expect("a triangle")
+}
+
 /// Whether a ray ends on the floor, and at which cosine.
 fn lands(ray: &EmissionSample) -> bool {
     let (corner, side) = FLOOR;
@@ -34,8 +38,9 @@ fn lands(ray: &EmissionSample) -> bool {
 
 /// Radiance along a ray, by the scene's description.
 fn radiance(scene: &Scene, ray: &EmissionSample) -> f64 {
-    let (m, t) = (ray.hit.triangle.mesh.index() as usize, ray.hit.triangle.triangle as usize);
-    oracle::sent(scene, m, t, ray.hit.barycentrics.map(f64::from), -ray.direction.as_dvec3())
+    let hit = hit(ray);
+    let (m, t) = (hit.triangle.mesh.index() as usize, hit.triangle.triangle as usize);
+    oracle::sent(scene, m, t, hit.barycentrics.map(f64::from), -ray.direction.as_dvec3())
 }
 
 /// Power that the lights send to the floor, by the irradiance at the midpoints of a grid on it.
@@ -65,7 +70,7 @@ fn assert_agreement(emission: &Emission<'_>, pcg: &mut Pcg32) {
     let mut drawn = 0;
     for _ in 0..2000 {
         let Some(ray) = emission.sample(random(pcg)) else { continue };
-        let pdf = emission.pdf(&ray.hit, ray.direction);
+        let pdf = emission.pdf(&hit(&ray), ray.direction);
         assert!((pdf / ray.pdf - 1.0).abs() < 1e-5, "{ray:?}: {pdf}");
         drawn += 1;
     }
@@ -154,7 +159,7 @@ fn rays_through_two_portals_count_once() {
             sky / f64::from(emission.pdf_ray(below, -ray.direction))
         });
         sum.add(value);
-        one.add(if ray.is_some_and(|ray| ray.hit.triangle.mesh.index() == 1) {
+        one.add(if ray.is_some_and(|ray| hit(&ray).triangle.mesh.index() == 1) {
             ray.map_or(0.0, |ray| radiance(&scene, &ray) / f64::from(ray.pdf))
         } else {
             0.0
@@ -248,10 +253,10 @@ fn a_distant_light_passes_portals_by_their_area() {
             let ray = emission.sample_distant(direction, random(&mut pcg));
             through.add(ray.map_or(0.0, |ray| {
                 drawn += 1;
-                let pdf = emission.pdf_distant(direction, &ray.hit);
+                let pdf = emission.pdf_distant(direction, &hit(&ray));
                 assert!((pdf / ray.pdf - 1.0).abs() < 1e-5, "{ray:?}: {pdf}");
-                let b = ray.hit.barycentrics.map(f64::from);
-                oracle::weight(&scene, &scene.meshes[0], ray.hit.triangle.triangle as usize, b) / f64::from(ray.pdf)
+                let b = hit(&ray).barycentrics.map(f64::from);
+                oracle::weight(&scene, &scene.meshes[0], hit(&ray).triangle.triangle as usize, b) / f64::from(ray.pdf)
             }));
         }
         for (_, t) in scene.triangles() {

@@ -8,11 +8,14 @@ use crate::common::hostile::{random_scene, shading_point};
 use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
-use crate::common::scene::Scene;
+use crate::common::scene::{Scene, random_point};
+use crate::kinds::{mixed, pdf_again};
 use fanlight::{LightSample, LightSampler, MeshId, ShadingPoint, Splitting, TriangleId};
 
 const SCENES: usize = 70;
 const POINTS: usize = 60;
+/// Scenes that mix all kinds of lights.
+const KINDS: usize = 12;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 
@@ -88,8 +91,34 @@ fn line(number: usize) -> String {
     format!("{number:2} {:2}/ 4 {drawn:5} {:016x} {}\n", arity.lanes(), hash.0, scene.name)
 }
 
+/// One line about a scene that mixes all kinds of lights.
+fn line_of_kinds(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 82);
+    let (lights, _) = mixed(&mut pcg, number);
+    let splitting = Splitting::new(0.7, 2);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    let emission = lights.emission();
+    for i in 0..POINTS {
+        let x = random_point(&mut pcg, i);
+        let at = lights.at(&x);
+        let u = pcg.cube();
+        for sample in at.sample(u).iter().chain(sample_split(&at, u, &splitting).iter().take(8)) {
+            drawn += 1;
+            let id = sample.light.id().map_or(u32::MAX, |id| id.index());
+            hash.add(&[f32::from_bits(id), sample.distance, sample.pdf, sample.pdf_area, sample.pmf]);
+            [sample.position, sample.normal, sample.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[pdf_again(&at, sample), at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
+        }
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            [ray.position, ray.normal, ray.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[ray.pdf, ray.pmf, emission.pdf_ray(x.position, pcg.direction())]);
+        }
+    }
+    format!("{number:2} kinds {drawn:5} {:016x}\n", hash.0)
+}
+
 fn all() -> String {
-    parallel::map(SCENES, line).concat()
+    parallel::map(SCENES + KINDS, |i| if i < SCENES { line(i) } else { line_of_kinds(i - SCENES) }).concat()
 }
 
 #[test]

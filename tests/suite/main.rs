@@ -22,6 +22,7 @@ mod fuzz_regressions;
 mod golden;
 mod invariance;
 mod irradiance;
+mod kinds;
 mod layering;
 mod memory;
 mod near;

@@ -150,7 +150,7 @@ impl Outgoing<'_> {
     /// A ray from an emitter or through a portal, by the light that it brings.
     pub(crate) fn sample(&self, u: [f32; 5]) -> Option<LightRay> {
         let ray = self.emission.sample(u)?;
-        let emitted = ray.hit.triangle.mesh.index() < self.lights.emitters;
+        let emitted = ray.hit()?.triangle.mesh.index() < self.lights.emitters;
         Some(LightRay { origin: ray.position, direction: ray.direction, emitted })
     }
 

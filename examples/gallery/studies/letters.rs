@@ -44,17 +44,17 @@ pub(super) fn study(model: &Model, effort: Effort) -> Result<Comparison, Error> 
 }
 
 fn study_source(name: &str, emitter: &Emitter<'_>, world: &World, seed: u32) -> Result<Comparison, Error> {
-    let guided = emitter.guided();
-    let fall = |way: &Way<'_>, numbers, seed, count| Fall::trace(emitter, way, world, numbers, seed, count);
-    let unguided = fall(&Way::Unguided, Numbers::Independent, seed, PHOTONS);
+    let guided = || emitter.guided();
+    let fall = |way: &MakeWay<'_>, numbers, seed, count| Fall::trace(emitter, way, world, numbers, seed, count);
+    let unguided = fall(&|| Way::Unguided, Numbers::Independent, seed, PHOTONS);
     let independent = fall(&guided, Numbers::Independent, seed, PHOTONS);
     let stratified = fall(&guided, Numbers::Stratified, seed, PHOTONS);
     let reference = fall(&guided, Numbers::Independent, !seed, REFERENCE_FACTOR * PHOTONS);
     let reference = Reference::exact(reference.image());
 
     // Long enough to be timed.
-    let rate = |way: &Way<'_>, numbers| fall(way, numbers, seed, TIMED_FACTOR * PHOTONS).rate();
-    let unguided_rate = rate(&Way::Unguided, Numbers::Independent);
+    let rate = |way: &MakeWay<'_>, numbers| fall(way, numbers, seed, TIMED_FACTOR * PHOTONS).rate();
+    let unguided_rate = rate(&|| Way::Unguided, Numbers::Independent);
     let rows = [
         ("unguided", &unguided, unguided_rate),
         ("guided", &independent, rate(&guided, Numbers::Independent)),
@@ -136,6 +136,9 @@ static SOBOL: LazyLock<[[u32; 32]; 5]> = LazyLock::new(|| {
     })
 });
 
+/// Makes a way for each piece of work: what is found out about one point belongs to one thread.
+type MakeWay<'a> = dyn Fn() -> Way<'a> + Sync + 'a;
+
 /// Photons that fell on the floor.
 struct Fall {
     photons: u32,
@@ -147,14 +150,22 @@ struct Fall {
 }
 
 impl Fall {
-    fn trace(emitter: &Emitter<'_>, way: &Way<'_>, world: &World, numbers: Numbers, seed: u32, photons: u32) -> Self {
+    fn trace(
+        emitter: &Emitter<'_>,
+        way: &MakeWay<'_>,
+        world: &World,
+        numbers: Numbers,
+        seed: u32,
+        photons: u32,
+    ) -> Self {
         let start = Instant::now();
         let nothing = || (0, vec![0.0; CELLS[0] * CELLS[1]]);
         let (through, power) = (0..photons.div_ceil(PIECE))
             .into_par_iter()
             .fold(nothing, |(mut through, mut power), piece| {
+                let way = way();
                 for i in PIECE * piece..photons.min(PIECE * (piece + 1)) {
-                    let Some(photon) = emitter.photon(way, numbers.of(seed, i)) else { continue };
+                    let Some(photon) = emitter.photon(&way, numbers.of(seed, i)) else { continue };
                     let start = photon.origin + 2.0 * world.scene.offset() * photon.direction;
                     let Some(point) = world.trace(start, photon.direction).1 else { continue };
                     through += u32::from(is_inside(&point));

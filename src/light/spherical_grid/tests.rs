@@ -6,7 +6,7 @@ use super::{GridPoint, SphericalGrid};
 use crate::blas::{CellNode, LEAF, Lattice, Root};
 use crate::env::{Environment, EnvironmentImage};
 use crate::light::linear_density::LinearDensity;
-use crate::light::{DrawnPoint, Illumination, LightTriangle, LightViewKind, TriangleView};
+use crate::light::{DrawnPoint, Illumination, LightTriangle, LightViewKind, LocalPoint, TriangleView};
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::testing::{Pcg32, chi_square, chi_square_limit};
 use crate::warp::{SphericalTriangle, Variate, seed};
@@ -86,7 +86,8 @@ fn a_samples_density_is_that_of_its_point() {
     for sky in skies() {
         let environment = sky.as_ref().map(Environment::as_view);
         for (light, x) in scenes(&mut pcg, 250) {
-            let Some(view) = TriangleView::new(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref())
+            let Some(view) =
+                TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v)
             else {
                 continue;
             };
@@ -107,7 +108,8 @@ fn densities_are_normalized_and_positive_where_light_is() {
     for (kind, sky) in skies().into_iter().enumerate() {
         let environment = sky.as_ref().map(Environment::as_view);
         for (light, x) in scenes(&mut pcg, 30) {
-            let Some(view) = TriangleView::new(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref())
+            let Some(view) =
+                TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v)
             else {
                 continue;
             };
@@ -120,7 +122,8 @@ fn densities_are_normalized_and_positive_where_light_is() {
             for i in 0..n * n {
                 let [u, v] = [i % n, i / n].map(|i| (f64::from(i) + f64::from(pcg.next_f32())) / f64::from(n));
                 let direction = triangle.direction([u, v]);
-                let pdf = view.pdf(point_towards(&view, direction)).unwrap_or(0.0) * triangle.solid_angle();
+                let point = LocalPoint::on_triangle(point_towards(&view, direction));
+                let pdf = view.pdf(point).unwrap_or(0.0) * triangle.solid_angle();
                 let radiance = environment.as_ref().map_or(1.0, |e| e.radiance(direction.as_vec3()));
                 let target = radiance * x.receiver.weight(direction.as_vec3());
                 assert!(pdf > 0.0 || target < 1e-5, "{kind} {x:?} {direction}: {target}");
@@ -149,7 +152,8 @@ fn samples_follow_the_density() {
     for sky in skies() {
         let environment = sky.as_ref().map(Environment::as_view);
         for (light, x) in scenes(&mut pcg, 6) {
-            let view = TriangleView::new(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref());
+            let view =
+                TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
             let Some(view) = view.filter(|view| LinearDensity::new(view).is_none()) else { continue };
             let Some(grid) = SphericalGrid::new(&view) else { continue };
             let mut expected = [0.0; 2 * BINS * BINS];
@@ -236,7 +240,7 @@ fn near_squares_have_the_right_mean_and_little_noise() {
                 let (mut mean, mut second) = (0.0, 0.0);
                 let count = 3000;
                 for light in &triangles {
-                    let view = TriangleView::new(light, &at, Illumination::default(), NO_CELLS, None);
+                    let view = TriangleView::wrapped(light, &at, Illumination::default(), NO_CELLS, None, |v| v);
                     let Some(view) = view else { continue };
                     let (mut sum, mut squares) = (0.0, 0.0);
                     for _ in 0..count {
@@ -269,7 +273,8 @@ fn drawn_directions_lie_in_their_cells() {
     for sky in skies() {
         let environment = sky.as_ref().map(Environment::as_view);
         for (light, x) in scenes(&mut pcg, 50) {
-            let view = TriangleView::new(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref());
+            let view =
+                TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
             let Some(grid) = view.as_ref().and_then(SphericalGrid::new) else { continue };
             for _ in 0..100 {
                 let Some((direction, cell, _)) = grid.draw(numbers(&mut pcg)) else { continue };

@@ -14,9 +14,8 @@ mod texel_cut;
 mod view;
 
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
-use crate::blas::Lattice;
 use crate::env::FeatureNode;
-use crate::light::{LightKind, LightPoint, LightView, LightViewKind};
+use crate::light::{LightKind, LightPoint, LightView, LightViewKind, LocalPoint};
 use crate::math;
 use crate::warp::{Variate, pick, sum};
 
@@ -96,7 +95,7 @@ impl VisibleFeatures {
         let view = &at.view(leaf);
         let triangle = view.as_ref()?.as_portal()?;
         let (point, per_excess) = FeatureView::new(triangle, &at.scene.environment, node).sample(part, u)?;
-        Some((LightPoint { leaf, point }, Some(per_excess)))
+        Some((LightPoint { leaf, point: LocalPoint::on_triangle(point) }, Some(per_excess)))
     }
 
     /// Returns the density of a point. `known` is an entry of the list that draws the point, with its density over the excess
@@ -116,7 +115,7 @@ impl VisibleFeatures {
         let Some((block, excess)) = environment.feature_at(direction) else { return none };
         let mut pdf = 0.0;
         for (index, (visible, weight)) in self.entries().enumerate() {
-            let LightPoint { leaf, point } = point;
+            let (leaf, point) = (point.leaf, point.point.lattice());
             let node = visible.node as usize;
             let is_here = visible.leaf == leaf || visible.leaf == ANY_PORTAL;
             if !is_here || !environment.feature_nodes()[node].holds_block(block) {
@@ -174,7 +173,7 @@ fn least_crossed(at: &Viewpoint<'_>, direction: glam::Vec3) -> Option<LightPoint
         let is_less = least.get().is_none_or(|least| leaf <= least.leaf);
         light.is_portal() && lights.scale(leaf) != 0.0 && is_less && light.is_visible(&at.x)
     };
-    let visit = |leaf: u32, point: Lattice| least.set(Some(LightPoint { leaf, point }));
+    let visit = |point: LightPoint| least.set(Some(point));
     at.scene.cross(at.x.position, direction, is_wanted, visit);
     least.get()
 }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::opening::{Coverage, Opening};
 use crate::blas::{self, ARITY, CHILD_CENTERS, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{EnvironmentView, FeatureNode};
-use crate::light::{LightViewKind, TriangleView};
+use crate::light::TriangleView;
 use crate::math;
 use crate::warp::Variate;
 
@@ -72,7 +72,7 @@ impl<'a> FeatureView<'a> {
 
     /// The directions in which a cell is visible.
     fn opening(&self, cell: LatticeCell) -> Opening {
-        Opening::new(self.environment, cell.corners().map(|corner| self.triangle.point(corner)))
+        Opening::new(self.environment, cell.corners().map(|corner| self.triangle.position(corner)))
     }
 
     /// Power of the feature through a cell, as if the cell's texture were one.

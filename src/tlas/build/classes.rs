@@ -54,7 +54,8 @@ mod tests {
         let item = |(i, &diagonal): (usize, &f32)| {
             let aabb = Aabb { min: Vec3::splat(i as f32), max: Vec3::new(i as f32 + diagonal, i as f32, i as f32) };
             let normals = Cone::single(Vec3::Z);
-            Item::new(&LightBounds { aabb, normals, flux: 1.0, portal: 0.0, two_sided: false }, i as u32)
+            let emission = core::f32::consts::FRAC_PI_2;
+            Item::new(&LightBounds { aabb, normals, emission, flux: 1.0, portal: 0.0, two_sided: false }, i as u32)
         };
         diagonals.iter().enumerate().map(item).collect()
     }

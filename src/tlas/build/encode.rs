@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, angle};
 use crate::math;
-use crate::tlas::node::{ALL, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
+use crate::tlas::node::{ALL, LANE_SHAPED, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
 
 /// Steps along each extent of a node. *Proved*: a box that fills the node has 253 halves of a step, the rounding of its
 /// center adds one and the rounding up of the halves another, and 255 is the largest code. Fewer steps make all boxes
@@ -80,12 +80,16 @@ impl<const N: usize> Node<N> {
         let [x, y, z] = direction.to_array().map(|value| code(value) as u32 & 0x3ff);
         let normal = x | y << 10 | z << 20;
         let side = if bounds.two_sided { LANE_TWO_SIDED } else { 0 };
-        self.normals[lane] = normal | side;
         self.lengths[lane] = (255.0 * length + 0.5) as u8;
         let axis = Vec3::from_array([0, 1, 2].map(|axis| Self::component(normal, axis))).normalize_or_zero();
         let theta = bounds.normals.theta + angle(axis, bounds.normals.axis) + CONE_MARGIN;
+        // What sends into less than a hemisphere has a cone of all directions that it sends in, if that is narrow.
+        let (is_everywhere, is_focused) = (bounds.emission > FRAC_PI_2, theta + bounds.emission < WIDEST_CONE);
+        let shape = if is_everywhere || is_focused { LANE_SHAPED } else { 0 };
+        self.normals[lane] = normal | side | shape;
+        let theta = if is_focused { theta + bounds.emission } else { theta };
         // Of a two-sided light one side always faces the shading point.
-        self.tangents[lane] = if bounds.two_sided || !(theta < WIDEST_CONE) {
+        self.tangents[lane] = if bounds.two_sided || is_everywhere || !(theta < WIDEST_CONE) {
             WIDE
         } else {
             let (sin, cos) = math::sin_cos(theta);

@@ -29,6 +29,9 @@ pub(crate) trait LeafOracle {
     /// Must be `#[inline(always)]`: the length is then a constant, and loops over it become vectors.
     fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]);
 
+    /// Whether there are leaves that do not send over the hemisphere around their normal.
+    fn has_shaped_leaves(&self) -> bool;
+
     /// Whether anything at all can travel from a leaf to the shading point. Asked only where the bounds of a leaf leave
     /// that open.
     fn is_visible(&self, leaf: u32) -> bool;
@@ -47,6 +50,11 @@ impl<O: LeafOracle> LeafOracle for &O {
     #[inline(always)]
     fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
         (**self).radiances(centers, radii, set, radiances);
+    }
+
+    #[inline(always)]
+    fn has_shaped_leaves(&self) -> bool {
+        (**self).has_shaped_leaves()
     }
 
     #[inline(always)]
@@ -88,16 +96,16 @@ const RECEIVER_VARIANCE_SHARE: f32 = 0.8;
 const DISTANCE_VARIANCE_SHARE: f32 = 0.3;
 
 /// Weights of a node's children before the oracle was asked anything.
-struct Estimates<const N: usize> {
+pub(super) struct Estimates<const N: usize> {
     /// Zero where nothing can arrive.
-    weights: [f32; N],
+    pub(super) weights: [f32; N],
     /// Bits of the largest weight.
-    largest: u32,
+    pub(super) largest: u32,
     /// Two sets of bits: leaves of which the bounds do not decide whether they are visible, and leaves near the shading
     /// point.
-    doubtful: [u32; 2],
+    pub(super) doubtful: [u32; 2],
     /// A set of bits: nodes near the shading point that may send something.
-    opened: u32,
+    pub(super) opened: u32,
 }
 
 impl<const N: usize> WideTree<'_, N> {
@@ -135,6 +143,10 @@ impl<const N: usize> Node<N> {
     #[inline(always)]
     fn asked(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> Estimates<N> {
         let mut estimates = self.estimates(x);
+        if oracle.has_shaped_leaves() {
+            // By value: what is referred to is kept in memory.
+            estimates = self.shaped(x, estimates);
+        }
         let [doubtful, near] = estimates.doubtful;
         if doubtful | near != 0 {
             estimates.largest = self.ask(oracle, &mut estimates.weights, doubtful, near);

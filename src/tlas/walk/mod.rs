@@ -7,6 +7,7 @@ mod beam;
 pub(in crate::tlas) mod descend;
 mod importance;
 pub(in crate::tlas) mod ray;
+mod shaped;
 mod split;
 
 use glam::Vec3;

@@ -2,7 +2,10 @@
 
 use std::sync::OnceLock;
 
-use fanlight::{Environment, Filter, Illumination, LightSampler, Mesh, Sides, Texture, TextureId, Weight, Wrap};
+use fanlight::{
+    DiskLight, Environment, Filter, Illumination, Lamp, LightSampler, Mesh, PointLight, Sides, SphereLight, SpotLight,
+    Texture, TextureId, TubeLight, Weight, Wrap,
+};
 use glam::{Mat3, Vec2, Vec3};
 
 use super::reader::Reader;
@@ -27,6 +30,9 @@ pub(crate) fn lights(reader: &mut Reader<'_>) -> Option<LightSampler> {
     for soup in &meshes {
         // A mesh that is refused leaves the builder as it was.
         let _ = builder.add_mesh(&soup.mesh(&textures));
+        if let Some(lamp) = soup.lamp() {
+            let _ = builder.add_light(lamp);
+        }
     }
     builder.build().ok()
 }
@@ -126,6 +132,19 @@ impl Soup {
         let weight = if reader.byte().is_multiple_of(2) { Ok(reader.float()) } else { Err(reader.below(3)) };
         let sides = if reader.byte().is_multiple_of(2) { Sides::One } else { Sides::Two };
         Self { positions, indices, uvs, weight, sides, portal: reader.byte().is_multiple_of(2) }
+    }
+
+    /// A light that is no mesh, where there is no triangle: by no byte of its own.
+    fn lamp(&self) -> Option<Lamp> {
+        let ([a, b, ..], true) = (&self.positions[..], self.indices.is_empty()) else { return None };
+        let (weight, size) = (self.weight.unwrap_or(1.0), self.uvs[0].x);
+        Some(match self.positions.len() % 5 {
+            0 => PointLight::new(*a, weight).into(),
+            1 => SpotLight::new(*a, *b, weight, [0.2, size]).into(),
+            2 => SphereLight::new(*a, size, weight).sides(self.sides).into(),
+            3 => DiskLight::new(*a, *b, size, weight).sides(self.sides).into(),
+            _ => TubeLight::new([*a, *b], size, weight).into(),
+        })
     }
 
     fn mesh(&self, textures: &[TextureId]) -> Mesh<'_> {

@@ -3,7 +3,7 @@
 pub(crate) mod build;
 pub(crate) mod reader;
 
-use fanlight::{LightSample, LightSampler, LightSamplerView, Receiver, ShadingPoint, Splitting};
+use fanlight::{LightSample, LightSampler, LightSamplerView, Receiver, SampledLight, ShadingPoint, Splitting};
 use glam::Vec3;
 use reader::Reader;
 use smallvec::SmallVec;
@@ -77,9 +77,11 @@ fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
     for sample in &samples {
         check_numbers(sample);
         if is_ordinary(&x) {
-            let pdf = match sample.hit() {
-                Some(hit) => at.pdf_split(&hit, &splitting),
-                None => at.pdf_split_environment(sample.direction, &splitting),
+            let pdf = match sample.light {
+                SampledLight::Triangle(hit) => at.pdf_split(&hit, &splitting),
+                SampledLight::Environment => at.pdf_split_environment(sample.direction, &splitting),
+                SampledLight::Shape(id) => at.pdf_split_light(id, sample.direction, &splitting),
+                _ => continue,
             };
             assert_close(pdf, sample.pdf, sample);
         }
@@ -90,7 +92,12 @@ fn check(lights: &LightSamplerView<'_>, x: &ShadingPoint, sample: &LightSample) 
     check_numbers(sample);
     if is_ordinary(x) {
         let at = lights.at(x);
-        let pdf = sample.hit().map_or_else(|| at.pdf_environment(sample.direction), |hit| at.pdf(&hit));
+        let pdf = match sample.light {
+            SampledLight::Triangle(hit) => at.pdf(&hit),
+            SampledLight::Shape(id) => at.pdf_light(id, sample.direction),
+            SampledLight::Punctual(id) => at.pmf_light(id),
+            _ => at.pdf_environment(sample.direction),
+        };
         assert_close(pdf, sample.pdf, sample);
         let along = lights.at(x).pdf_sample_direction(sample);
         assert!(along.is_finite() && along >= sample.pdf * (1.0 - TOLERANCE), "{along} along {sample:?}");
@@ -109,7 +116,7 @@ fn check_numbers(sample: &LightSample) {
     let LightSample { position, normal, direction, distance, pdf, pdf_area, pmf, .. } = *sample;
     assert!(position.is_finite() && normal.is_finite() && direction.is_finite(), "{sample:?}");
     assert!((direction.length() - 1.0).abs() < 1e-4, "{sample:?}");
-    assert!(distance >= 0.0 && (distance.is_finite() || sample.hit().is_none()), "{sample:?}");
+    assert!(distance >= 0.0 && (distance.is_finite() || sample.light == SampledLight::Environment), "{sample:?}");
     assert!(pdf > 0.0 && pdf_area > 0.0 && pmf > 0.0, "{sample:?}");
     assert!(pdf.is_finite() && pdf_area.is_finite() && pmf.is_finite(), "{sample:?}");
 }
@@ -129,11 +136,15 @@ fn emit(lights: &LightSampler, reader: &mut Reader<'_>) {
     if let Some(ray) = emission.sample(u) {
         assert!(ray.position.is_finite() && (ray.direction.length() - 1.0).abs() < 1e-4, "{ray:?}");
         assert!(ray.pdf > 0.0 && ray.pdf.is_finite() && ray.pmf > 0.0, "{ray:?}");
-        assert_close(emission.pdf(&ray.hit, ray.direction), ray.pdf, &ray);
+        let pdf = match ray.light.id() {
+            Some(id) => emission.pdf_light(id, ray.direction),
+            None => emission.pdf(&ray.hit().expect("a triangle"), ray.direction),
+        };
+        assert_close(pdf, ray.pdf, &ray);
     }
     assert_density(emission.pdf_ray(reader.vector(), reader.vector()));
     let direction = reader.vector().normalize_or(Vec3::X);
     if let Some(ray) = emission.sample_distant(direction, [u[0], u[1], u[2]]) {
-        assert_close(emission.pdf_distant(direction, &ray.hit), ray.pdf, &ray);
+        assert_close(emission.pdf_distant(direction, &ray.hit().expect("a triangle")), ray.pdf, &ray);
     }
 }

@@ -1,7 +1,8 @@
 //! Scenes as plain descriptions, from which a sampler is built and an oracle computes.
 
 use fanlight::{
-    Arity, Environment, Filter, Illumination, LightSampler, Mesh, Receiver, ShadingPoint, Sides, Texture, Weight, Wrap,
+    Arity, Environment, Filter, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver, ShadingPoint, Sides,
+    Texture, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -220,6 +221,11 @@ impl Scene {
     }
 
     pub(crate) fn build(&self, arity: Arity) -> LightSampler {
+        self.build_with(arity, |_| {})
+    }
+
+    /// Builds the scene with what is added to it at last.
+    pub(crate) fn build_with(&self, arity: Arity, add: impl FnOnce(&mut LightSamplerBuilder<'_>)) -> LightSampler {
         let builder = LightSampler::builder().environment(self.environment()).illumination(self.illumination);
         let mut builder = builder.arity(arity);
         let textures: Vec<_> = self.images.iter().map(|image| builder.add_texture(image.texture())).collect();
@@ -233,6 +239,7 @@ impl Scene {
             let mesh = mesh(&light.positions, &light.indices).uvs(&light.uvs).weight(weight).sides(sides);
             builder.add_mesh(&mesh).expect("the mesh is valid");
         }
+        add(&mut builder);
         builder.build().expect("there are not too many triangles")
     }
 

@@ -25,6 +25,7 @@ fn lights(n: usize, place: Vec3, scale: f32, narrow: bool, pcg: &mut Pcg32) -> V
         let bounds = LightBounds {
             aabb: Aabb::around(&[center - size, center + size]),
             normals: Cone::single(normal),
+            emission: core::f32::consts::FRAC_PI_2,
             flux: if i % 4 > 0 { energy } else { 0.0 },
             portal: if i % 4 < 2 { energy } else { 0.0 },
             two_sided: i % 7 == 0,
