@@ -158,7 +158,7 @@ pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
 pub use light::{Illumination, Mesh, MeshUpdate, Sides, Weight};
-pub use receiver::{Receiver, ShadingPoint};
+pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
 pub use record::{Filter, Hit, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,

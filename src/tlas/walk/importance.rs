@@ -5,13 +5,16 @@
 //! A cluster's position and normal are taken for normal variables with its mean and variance; cosines become the
 //! expectation of a clamped normal variable.
 //!
+//! The lobe of a receiver is weighed in the direction to a cluster's mean, widened by the variance of the positions
+//! ([`Lobe`]).
+//!
 //! Moments say little of what is near the shading point. A cluster there is opened, which means that the sum of its own
 //! children's weights is its weight. A light there is weighed by its exact irradiance.
 
 use glam::Vec3;
 
 use crate::math::{self, at_least, only_if};
-use crate::receiver::{LEAST_CLUSTER_COSINE, ReceiverLanes, ShadingPoint};
+use crate::receiver::{LEAST_CLUSTER_COSINE, Lobe, ReceiverLanes, ShadingPoint};
 use crate::tlas::node::{ALL, Child, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
 use crate::tlas::tree::WideTree;
 use crate::warp::{keep_least, within_range};
@@ -106,7 +109,7 @@ impl<const N: usize> WideTree<'_, N> {
     /// A child that is a node itself and near the shading point is opened: the sum of its own children's weights is its
     /// weight. That is one level, and depends on the shading point alone.
     #[inline(always)]
-    pub(super) fn weights(&self, index: usize, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
+    pub(super) fn weights(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> [f32; N] {
         let node = &self.nodes[index];
         let Estimates { mut weights, mut largest, mut opened, .. } = node.asked(x, oracle);
         if opened != 0 {
@@ -124,7 +127,7 @@ impl<const N: usize> WideTree<'_, N> {
 
     /// Returns the sum of the weights of a node's children.
     #[inline(always)]
-    fn opened(&self, index: usize, x: &ReceiverLanes, oracle: &impl LeafOracle) -> f32 {
+    fn opened(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> f32 {
         let sum: f32 = self.nodes[index].asked(x, oracle).weights.iter().sum();
         only_if(sum > 0.0, within_range(sum))
     }
@@ -133,7 +136,7 @@ impl<const N: usize> WideTree<'_, N> {
 impl<const N: usize> Node<N> {
     /// Estimates all lanes, and asks the oracle about what is in doubt and what portals show.
     #[inline(always)]
-    fn asked(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> Estimates<N> {
+    fn asked(&self, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> Estimates<N> {
         let mut estimates = self.estimates(x);
         let [doubtful, near] = estimates.doubtful;
         if doubtful | near != 0 {
@@ -165,7 +168,7 @@ impl<const N: usize> Node<N> {
 
     /// Multiplies what comes through portals by what is seen there, and returns the bits of the largest weight.
     #[inline(always)]
-    fn look_through(&self, x: &ReceiverLanes, oracle: &impl LeafOracle, weights: &mut [f32; N]) -> u32 {
+    fn look_through(&self, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle, weights: &mut [f32; N]) -> u32 {
         let (portals, centers, halves) = (self.portals, self.centers, self.halves);
         let origin = Vec3::from_array(self.origin) - x.position;
         let step = Vec3::from_array(self.steps.map(wide));
@@ -193,7 +196,7 @@ impl<const N: usize> Node<N> {
 
     /// Estimates all lanes, in one plain loop over arrays that a compiler can turn into vectors.
     #[inline(always)]
-    fn estimates(&self, x: &ReceiverLanes) -> Estimates<N> {
+    fn estimates(&self, x: &ReceiverLanes<impl Lobe>) -> Estimates<N> {
         let (normals, energies, centers, halves) = (self.normals, self.energies, self.centers, self.halves);
         let (means, deviations, lengths, tangents) = (self.means, self.deviations, self.lengths, self.tangents);
         // Relative to the shading point before anything else: far from the origin the difference is what is exact.
@@ -246,6 +249,7 @@ impl<const N: usize> Node<N> {
             let loss = NORMAL_VARIANCE_SHARE - length * length * (NORMAL_VARIANCE_SHARE / (255.0 * 255.0));
             let spread = loss * squared + EMITTER_VARIANCE_SHARE * variance;
             let emitter = at_least(clamped_mean(facing, spread), LEAST_CLUSTER_COSINE * distance);
+            let receiver = x.lobe.weigh(receiver, to_mean.to_array(), distance, variance * inverse2);
             let term = (receiver * inverse2) * emitter * inverse2;
 
             weights[i] = only_if(!culled, within_range(energy * term));
