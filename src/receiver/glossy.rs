@@ -12,7 +12,7 @@
 //! `1 / (2 o·h)` of it across. The mean of D is therefore that of a wider distribution, with
 //!
 //! ```text
-//! α'² = √((α² + t s²/4) (α² + t s²/(4 (o·h)²)))
+//! α'² = √((α² + s²/4) (α² + s²/(4 (o·h)²)))
 //! ```
 
 use core::f32::consts::PI;
@@ -42,20 +42,8 @@ const LEAST_OUTGOING: f32 = 1e-3;
 /// little of a cluster stands over the horizon of a lobe starves.
 const LEAST_WEIGHT: f32 = 1e-3;
 
-/// Share of the variance of directions by which the distribution of normals becomes wider. *Measured* on `lobe-α-kd`; see
-/// docs/ACCURACY.md, "Lobes".
-///
-/// Larger: the choice follows the lobe less. Smaller: clusters off the peak starve though some of their lights are in it.
-const WIDENING: f32 = 0.75;
-
 /// Least squared length of the sum of two unit vectors. *Proved*: rounding leaves as much of opposite ones.
 const LEAST_SUM2: f32 = 1e-7;
-
-/// Variance of half vectors, relative to the squared width of the lobe, up to which the lobe is about constant.
-///
-/// Chosen: the lobe's value has a relative deviation of a third then. Larger: divides less, for more noise. Smaller: steps
-/// that cost more than they gain.
-const CONSTANT_SPREAD: f32 = 1.0 / 64.0;
 
 /// Points along an edge of a triangle whose irradiance is found by its parts.
 ///
@@ -203,7 +191,7 @@ impl GgxLobe {
     fn value(&self, cosine: f32, [x, y, z]: [f32; 3], spread2: f32) -> f32 {
         let (sine2, sum2) = self.half_vector([x, y, z]);
         // (o·h)² is a quarter of |ω + o|².
-        let blur = (0.25 * WIDENING) * spread2;
+        let blur = 0.25 * spread2;
         let widths2 = (self.alpha2 + blur) * (self.alpha2 + blur * (4.0 / sum2));
         let width2 = at_most(sqrt(widths2), 1.0);
         // In this form nothing cancels where the lobe is narrow. π D:
@@ -238,11 +226,13 @@ impl Lobe for GgxLobe {
         self.diffuse * toward + distance * (value + LEAST_WEIGHT * self.share)
     }
 
+    /// The logarithm of D changes by 4 h / (α² + h²) for each step of the half vector, which is 2 / √(α² + h²) where that is
+    /// largest.
     #[inline(always)]
-    fn is_about_constant(&self, direction: [f32; 3], spread2: f32) -> bool {
+    fn variation(&self, direction: [f32; 3], spread2: f32) -> f32 {
         let (sine2, sum2) = self.half_vector(direction);
         let blur = 0.25 * spread2 * at_least(4.0 / sum2, 1.0);
-        blur <= CONSTANT_SPREAD * (self.alpha2 + sine2)
+        8.0 * blur / (self.alpha2 + sine2)
     }
 
     #[inline(always)]

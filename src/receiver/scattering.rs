@@ -25,11 +25,6 @@ use crate::math::sqrt;
 /// Larger: weights become as large as `f32` allows. Smaller: clear media are guided less closely than can be.
 const LARGEST_ASYMMETRY: f32 = 0.99;
 
-/// Relative variance of the phase function in a region up to which it is about constant. Chosen.
-///
-/// Larger: divides less, for more noise. Smaller: steps that cost more than they gain.
-const CONSTANT_VARIANCE: f32 = 0.1;
-
 /// A point in a medium with a Henyey-Greenstein phase function, seen from an outgoing direction.
 ///
 /// As with [`Glossy`](crate::Glossy), the phase function only guides: densities are exact whatever the host's own is.
@@ -129,14 +124,14 @@ impl Lobe for PhaseLobe {
         toward * (EVEN_SHARE + (1.0 - EVEN_SHARE) * value)
     }
 
-    /// By the slope of the logarithm: `3 g sin θ / (1 + g² + 2 g cos θ)`.
+    /// The logarithm changes by 3 g sin θ / (1 + g² + 2 g cos θ) for each radian.
     #[inline(always)]
-    fn is_about_constant(&self, direction: [f32; 3], spread2: f32) -> bool {
+    fn variation(&self, direction: [f32; 3], spread2: f32) -> f32 {
         let (g, cosine) = (self.asymmetry, self.cosine(direction));
         let base = 1.0 + g * g + 2.0 * g * cosine;
         // Around the peak, half the blur stands in for the sine.
         let sine2 = 1.0 - cosine * cosine + 0.5 * spread2;
-        9.0 * g * g * sine2 * 0.5 * spread2 <= CONSTANT_VARIANCE * (base * base)
+        9.0 * g * g * sine2 * 0.5 * spread2 / (base * base)
     }
 
     #[inline(always)]
