@@ -23,7 +23,7 @@ const ENVIRONMENT_DISTANCE: f32 = 1e15;
 #[derive(Debug)]
 #[must_use]
 pub struct PointSampler<'a> {
-    at: Viewpoint<'a>,
+    pub(super) at: Viewpoint<'a>,
     mixture: Mixture,
 }
 

@@ -19,7 +19,7 @@ use crate::scenes::{self, Scene};
 
 /// Scenes with the names of their workloads, roughnesses and shares of the diffuse part.
 const WORKLOADS: [(&str, &str, &[f64], &[f64]); 3] = [
-    ("cloud-10000", "lobe", &[0.05, 0.1, 0.2, 0.4], &[0.0, 0.5]),
+    ("cloud-10000", "lobe", &[0.01, 0.02, 0.05, 0.1, 0.2, 0.4], &[0.0, 0.5]),
     ("window", "lobe-window", &[0.05, 0.1, 0.2, 0.4], &[0.0]),
     ("quad", "lobe-quad", &[0.05, 0.1, 0.2, 0.4], &[0.0]),
 ];
