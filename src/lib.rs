@@ -164,9 +164,10 @@ pub use glam;
 pub use light::{
     DiskLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Sides, SphereLight, SpotLight, TubeLight, Weight,
 };
-pub use receiver::{Receiver, ShadingPoint};
+pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
 pub use record::{Filter, Hit, LightId, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
+    ResampledLight,
 };
 pub use tlas::{Arity, Splitting};

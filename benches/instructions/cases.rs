@@ -3,8 +3,8 @@
 use core::hint::black_box;
 
 use fanlight::{
-    Environment, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, ShadingPoint, Splitting, Texture,
-    TriangleId, Weight,
+    Environment, Glossy, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver, ShadingPoint,
+    Splitting, Texture, TriangleId, Weight,
 };
 use glam::Vec3;
 use smallvec::SmallVec;
@@ -55,6 +55,8 @@ pub(crate) const ALL: &[Case] = &[
     },
     Case { name: "cloud/sample_split", calls: CALLS, run: sample_split },
     Case { name: "cloud/nee", calls: CALLS, run: || next_event("cloud-10000") },
+    Case { name: "cloud/lobe-sample", calls: CALLS, run: || sample_lobe("cloud-10000") },
+    Case { name: "cloud/lobe-nee", calls: CALLS, run: || next_event_lobe("cloud-10000") },
     Case { name: "cloud/build", calls: 1, run: build },
     Case { name: "quad/sample", calls: CALLS, run: || sample("quad") },
     Case {
@@ -64,6 +66,7 @@ pub(crate) const ALL: &[Case] = &[
     },
     Case { name: "quad/nee", calls: CALLS, run: || next_event("quad") },
     Case { name: "cornell/nee", calls: CALLS, run: cornell },
+    Case { name: "quad/lobe-nee", calls: CALLS, run: || next_event_lobe("quad") },
     Case { name: "window/sample", calls: CALLS, run: || sample("window") },
     Case {
         name: "window/pdf",
@@ -77,6 +80,7 @@ pub(crate) const ALL: &[Case] = &[
     },
     Case { name: "window/at", calls: CALLS, run: at },
     Case { name: "window/nee", calls: CALLS, run: || next_event("window") },
+    Case { name: "window/lobe-nee", calls: CALLS, run: || next_event_lobe("window") },
     Case { name: "window/emission", calls: CALLS, run: emission },
     Case { name: "star/sample", calls: CALLS, run: || sample("star") },
     Case { name: "star/nee", calls: CALLS, run: || next_event("star") },
@@ -150,9 +154,32 @@ fn numbers() -> Vec<[f32; 3]> {
     (0..CALLS).map(|_| pcg.uniform3()).collect()
 }
 
+/// Roughness of the lobes.
+const ROUGHNESS: f32 = 0.1;
+
+/// The same points as glossy surfaces, seen from directions above them.
+fn with_lobes(points: Vec<ShadingPoint>) -> Vec<ShadingPoint> {
+    let mut pcg = Pcg32::new(34, 2);
+    let with_lobe = |x: ShadingPoint| {
+        let Receiver::Surface(normal) = x.receiver else { unreachable!("all workloads have opaque surfaces") };
+        let outgoing = pcg.direction().as_vec3();
+        let outgoing = if outgoing.dot(normal) < 0.0 { -outgoing } else { outgoing };
+        ShadingPoint::glossy(x.position, Glossy::new(normal, outgoing, ROUGHNESS))
+    };
+    points.into_iter().map(with_lobe).collect()
+}
+
 fn sample(workload: &str) {
+    sample_at(workload, |points| points);
+}
+
+fn sample_lobe(workload: &str) {
+    sample_at(workload, with_lobes);
+}
+
+fn sample_at(workload: &str, change: fn(Vec<ShadingPoint>) -> Vec<ShadingPoint>) {
     let scene = scenes::scene(workload);
-    let (lights, points, numbers) = (lights(&scene), scene.points.timing(CALLS), numbers());
+    let (lights, points, numbers) = (lights(&scene), change(scene.points.timing(CALLS)), numbers());
     measured(|i| {
         black_box(lights.at(&points[i]).sample(numbers[i]));
     });
@@ -197,9 +224,17 @@ fn lit_points(scene: &Scene, lights: &LightSampler) -> Vec<ShadingPoint> {
 
 /// What a host does at a lit point for one light sample.
 fn next_event(workload: &str) {
+    next_event_at(workload, |points| points);
+}
+
+fn next_event_lobe(workload: &str) {
+    next_event_at(workload, with_lobes);
+}
+
+fn next_event_at(workload: &str, change: fn(Vec<ShadingPoint>) -> Vec<ShadingPoint>) {
     let scene = scenes::scene(workload);
     let lights = lights(&scene);
-    let (points, numbers) = (lit_points(&scene, &lights), numbers());
+    let (points, numbers) = (change(lit_points(&scene, &lights)), numbers());
     measured(|i| {
         let here = lights.at(&points[i]);
         if let Some(sample) = here.sample(numbers[i]) {

@@ -50,7 +50,12 @@ fn run(args: &Args) -> Result<(), Failure> {
             Part::Table => table(args)?,
             Part::Stratification => studies::stratification::run(args)?,
             Part::Splitting => studies::splitting::run(args),
-            Part::Lobes => studies::lobes::run(args),
+            Part::Lobes => {
+                let rows = studies::lobes::run(args);
+                if let Some(path) = &args.json {
+                    std::fs::write(path, report::lobes_json(&rows))?;
+                }
+            }
             Part::Room => studies::room::run(args)?,
             Part::Terms => studies::terms::run(&args.effort),
         }

@@ -4,6 +4,7 @@ use core::fmt::Write as _;
 
 use crate::instruction_set;
 use crate::metrics::Summary;
+use crate::studies::lobes::LobeRow;
 use crate::timing::Nanoseconds;
 
 /// One workload, method and class.
@@ -132,4 +133,18 @@ fn object(row: &Row) -> String {
         write!(out, ", \"{key}\": {}", number(value)).expect("a string takes everything");
     }
     out + "}"
+}
+
+/// Rows about glossy receivers as a list of objects, with the same keys.
+pub(crate) fn lobes_json(rows: &[LobeRow]) -> String {
+    let object = |row: &LobeRow| {
+        let LobeRow { workload, method, points, relvar } = row;
+        format!(
+            "  {{\"workload\": \"{workload}\", \"method\": \"{method}\", \"class\": \"all\", \"points\": {points}, \
+             \"relvar_median\": {}, \"relvar_p90\": {}, \"relvar_ew\": {}}}",
+            relvar.median, relvar.p90, relvar.energy_weighted
+        )
+    };
+    let objects: Vec<String> = rows.iter().map(object).collect();
+    format!("[\n{}\n]\n", objects.join(",\n"))
 }

@@ -12,7 +12,7 @@ use super::triangle_view::TriangleView;
 use crate::blas::{self, ARITY, CHILD_CENTERS, CellTarget, Guide, LatticeCell};
 use crate::env::EnvironmentView;
 use crate::math::{at_least, sqrt};
-use crate::receiver::{HeightWeights, ReceiverKind};
+use crate::receiver::{HeightWeights, Lobe, ReceiverKind, SPREAD_OF_RADIUS2};
 use crate::simd::Kernel;
 use crate::warp::equal_area::sphere_to_square_quickly;
 
@@ -63,9 +63,11 @@ pub(super) struct SpatialCell {
 }
 
 /// The target that the cells of a triangle are chosen by.
-pub(super) struct CellKernel<'a> {
+pub(super) struct CellKernel<'a, L> {
     view: &'a TriangleView<'a>,
     weights: HeightWeights,
+    /// Lobe of the receiver, in the frame of the corners of cells.
+    lobe: L,
     horizon: f32,
     /// Least squared distance of any point.
     least_distance2: f32,
@@ -76,26 +78,32 @@ pub(super) struct CellKernel<'a> {
 }
 
 /// A descent from a triangle to a cell.
-pub(super) struct CellDescent<'a, G> {
+pub(super) struct CellDescent<'a, G, L> {
     pub(super) view: &'a TriangleView<'a>,
     pub(super) guide: &'a mut G,
+    /// Lobe of the view's receiver.
+    pub(super) lobe: L,
 }
 
-impl<G: Guide> Kernel for CellDescent<'_, G> {
+impl<G: Guide, L: Lobe> Kernel for CellDescent<'_, G, L> {
     type Output = Option<(LatticeCell, f64)>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        blas::descend(self.view.cells, self.view.root, &CellKernel::new(self.view), self.guide)
+        blas::descend(self.view.cells, self.view.root, &CellKernel::new(self.view, self.lobe), self.guide)
     }
 }
 
-impl<'a> CellKernel<'a> {
+impl<'a, L: Lobe> CellKernel<'a, L> {
     #[inline(always)]
-    fn new(view: &'a TriangleView<'a>) -> Self {
+    fn new(view: &'a TriangleView<'a>, lobe: L) -> Self {
         Self {
             view,
             weights: view.receiver.height_weights(),
+            lobe: match view.environment {
+                Some(environment) => lobe.map(|vector| environment.local_vector(vector)),
+                None => lobe,
+            },
             horizon: view.cell_horizon(),
             least_distance2: at_least(view.height * view.height, f32::MIN_POSITIVE),
             environment: view.environment,
@@ -128,6 +136,7 @@ impl<'a> CellKernel<'a> {
         let radius = if COVERING { sqrt(self.view.radius2 * share) + CENTER_ROUNDING * self.extent() } else { 0.0 };
         // Everything that the loop needs is a local value: what is behind a reference might be what the loop writes.
         let (receiver, horizon, least_distance2) = (self.weights, self.horizon, self.least_distance2);
+        let (lobe, variance) = (self.lobe, SPREAD_OF_RADIUS2 * self.view.radius2 * share);
         let (v0, e1, e2) = (v0.to_array(), e1.to_array(), e2.to_array());
         let (mut fine, mut cover) = ([0; ARITY], [0; ARITY]);
         for i in 0..ARITY {
@@ -137,7 +146,7 @@ impl<'a> CellKernel<'a> {
             let distance = sqrt(distance2);
             let height = h0 + (h1 * b1 + h2 * b2);
             let heights = [height + turn * farther[0], height + turn * farther[1], height + turn * farther[2]];
-            let toward = receiver.mean(heights, distance);
+            let toward = lobe.weigh(receiver.mean(heights, distance), [x, y, z], distance, variance / distance2);
             let softened = distance2 + softening;
             let weight = at_least(scale * toward / (softened * softened), LEAST_WEIGHT);
             let highest = at_least(at_least(heights[0], heights[1]), heights[2]);
@@ -185,6 +194,13 @@ impl<'a> CellKernel<'a> {
         self.view.radius2 * share <= CONSTANT_GEOMETRY * distance2 && self.has_constant_cosine(cell.heights)
     }
 
+    /// Whether the lobe is about constant over a cell with this center and squared distance.
+    #[inline(always)]
+    fn has_constant_lobe(&self, center: Vec3, share: f32, distance2: f32) -> bool {
+        let direction = center * (1.0 / sqrt(distance2));
+        self.lobe.is_about_constant(direction.to_array(), SPREAD_OF_RADIUS2 * self.view.radius2 * share / distance2)
+    }
+
     /// Whether the receiver's cosine is nearly constant over a cell, or too small to matter. The heights are those of the
     /// cell's corners over the receiver's plane.
     #[inline(always)]
@@ -195,7 +211,7 @@ impl<'a> CellKernel<'a> {
     }
 }
 
-impl CellTarget for CellKernel<'_> {
+impl<L: Lobe> CellTarget for CellKernel<'_, L> {
     type Cell = SpatialCell;
 
     #[inline(always)]
@@ -249,7 +265,9 @@ impl CellTarget for CellKernel<'_> {
             let point = sphere_to_square_quickly((center * inverse).to_array());
             cell.has_constant_radiance = environment.is_about_constant(point, solid_angle);
         }
-        cell.has_constant_radiance && self.has_constant_geometry(cell, share, distance2)
+        cell.has_constant_radiance
+            && self.has_constant_geometry(cell, share, distance2)
+            && self.has_constant_lobe(center, share, distance2)
     }
 }
 
@@ -276,6 +294,7 @@ impl TriangleView<'_> {
             distance2: center.length_squared().max(self.height * self.height).max(f32::MIN_POSITIVE),
             area: self.area * at.area(),
             height: self.height,
+            variance: SPREAD_OF_RADIUS2 * self.radius2 * at.area(),
         };
         self.illumination.estimate(self.receiver, &cell)
     }

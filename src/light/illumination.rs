@@ -6,7 +6,7 @@ use core::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use crate::math;
-use crate::receiver::{Receiver, ReceiverKind};
+use crate::receiver::{Lobe, Receiver, ReceiverKind, for_lobe};
 
 /// Which estimate of the irradiance from a cell guides the descent inside a triangle.
 ///
@@ -60,7 +60,8 @@ impl Illumination {
         }
         match self {
             Self::ClampedVertices => clamped_vertices(receiver, cell),
-            _ => self.at_center(receiver, cell),
+            Self::Boundary => self.at_center(receiver, cell),
+            Self::Conservative | Self::PointToPoint => self.at_center(receiver, cell) * lobe_factor(receiver, cell),
         }
     }
 
@@ -93,12 +94,35 @@ pub(super) struct CellView {
     pub(super) area: f32,
     /// Distance of the shading point from its plane.
     pub(super) height: f32,
+    /// Variance of the points of the cell.
+    pub(super) variance: f32,
+}
+
+impl CellView {
+    /// Returns the mean weight times the distance, by the same without a lobe.
+    fn with_lobe(&self, receiver: Receiver, toward: f32) -> f32 {
+        let [a, b, c] = self.vertices;
+        let center = ((a + b + c) * (1.0 / 3.0)).to_array();
+        let (distance, spread2) = (math::sqrt(self.distance2), self.variance / self.distance2);
+        for_lobe!(receiver, lobe => lobe.weigh(toward, center, distance, spread2))
+    }
+}
+
+/// Returns the weight of a cell relative to that without a lobe, for the terms that take the cosine at the center.
+fn lobe_factor(receiver: Receiver, cell: &CellView) -> f32 {
+    if !receiver.has_lobe() {
+        return 1.0;
+    }
+    let inverse = 1.0 / math::sqrt(cell.distance2);
+    let cosine = receiver.weight_at_height(cell.heights.iter().sum::<f32>() * (1.0 / 3.0), inverse);
+    let toward = cosine.max(LEAST_CELL_COSINE) * math::sqrt(cell.distance2);
+    cell.with_lobe(receiver, toward) / toward
 }
 
 /// The default, `Σ_k max(0, n · v_k) A h / 3 π (d² + A/4)²`, as the [kernel](super::cell_kernel) has it for many cells.
 fn clamped_vertices(receiver: Receiver, cell: &CellView) -> f32 {
     let softened = cell.distance2 + SOFTENING * cell.area;
-    let toward = receiver.height_weights().mean(cell.heights, math::sqrt(cell.distance2));
+    let toward = cell.with_lobe(receiver, receiver.height_weights().mean(cell.heights, math::sqrt(cell.distance2)));
     (cell.area * cell.height * FRAC_1_PI * toward / (softened * softened)).max(f32::MIN_POSITIVE)
 }
 
@@ -117,6 +141,7 @@ mod tests {
             distance2: ((a + b + c) / 3.0).length_squared(),
             area: 0.5,
             height: 0.3,
+            variance: 0.1,
         };
         strategy.estimate(receiver, &cell)
     }

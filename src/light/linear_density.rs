@@ -4,11 +4,13 @@
 //! barycentrics, given by its three corners. (Hart et al. 2020, "Practical Product Sampling by Fitting and Composing Warps",
 //! warp a square in this way.) No direction is computed, so that a sample costs next to nothing.
 
+use glam::Vec3;
+
 use super::triangle_view::TriangleView;
 use super::{DrawnPoint, LightViewKind, LocalPoint};
 use crate::blas::Lattice;
 use crate::math::{at_least, sqrt};
-use crate::receiver::ReceiverKind;
+use crate::receiver::{Lobe, ReceiverKind, SPREAD_OF_RADIUS2, for_lobe};
 use crate::warp::Variate;
 use crate::warp::triangle::{linear_pdf, square_to_linear_triangle};
 
@@ -40,12 +42,7 @@ impl LinearDensity {
         if !(view.radius2 <= LINEAR_GEOMETRY * distance2 && view.has_constant_radiance(center, distance2)) {
             return None;
         }
-        let corners = view.vertices.map(|vertex| {
-            let vertex2 = vertex.length_squared();
-            let ratio = distance2 / vertex2;
-            let toward = view.receiver.height_weights().at(view.receiver_normal.dot(vertex), sqrt(vertex2));
-            toward * (ratio * ratio)
-        });
+        let corners = for_lobe!(view.receiver, lobe => corners(view, lobe, center, distance2))?;
         let [a, b, c] = corners;
         let (least, largest) = (a.min(b).min(c), a.max(b).max(c));
         let is_even = least > 0.0 && largest < f32::INFINITY && least >= LEAST_CORNER_RATIO * largest;
@@ -67,6 +64,21 @@ impl LinearDensity {
         let pdf = pdf_area / view.solid_angle_per_area(view.position(point));
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
+}
+
+/// Weights of the corners, relative to each other; `None` where the lobe varies too much in between.
+#[inline(always)]
+fn corners(view: &TriangleView<'_>, lobe: impl Lobe, center: Vec3, distance2: f32) -> Option<[f32; 3]> {
+    let spread2 = SPREAD_OF_RADIUS2 * view.radius2 / distance2;
+    let direction = center * (1.0 / sqrt(distance2));
+    lobe.is_about_constant(direction.to_array(), spread2).then(|| {
+        view.vertices.map(|vertex| {
+            let vertex2 = vertex.length_squared();
+            let (ratio, distance) = (distance2 / vertex2, sqrt(vertex2));
+            let toward = view.receiver.height_weights().at(view.receiver_normal.dot(vertex), distance);
+            lobe.weigh(toward, vertex.to_array(), distance, spread2) * (ratio * ratio)
+        })
+    })
 }
 
 #[cfg(test)]

@@ -4,8 +4,9 @@
 //! map from the unit square to each ([`SphericalTriangle`](crate::warp::SphericalTriangle)) makes a grid of 8 x 8 cells,
 //! whose columns meet in one corner. (Two triangles share the columns of the first step.) Cells are chosen by solid angle
 //! times the receiver's weight and the environment's radiance in their central directions; one vector loop weighs all 64.
-//! While the environment varies over the chosen cell, it is divided again in the same way, in up to three steps in all. Of
-//! the geometry, only the receiver's weight varies within a cell: the density does not depend on how near the triangle is.
+//! While the environment or the receiver's lobe varies over the chosen cell, it is divided again in the same way, in up to
+//! three steps in all. Of the geometry, only the receiver's weight varies within a cell: the density does not depend on how
+//! near the triangle is.
 //!
 //! Sampling and density share [`descend`](SphericalGrid::descend): a [`GridGuide`] draws the way or follows a point. A drawn
 //! direction is rounded to a point of the triangle's lattice, and the density is that of the rounded point.
@@ -16,7 +17,7 @@ use super::triangle_view::TriangleView;
 use super::visible_part::VisiblePart;
 use crate::env::{EnvironmentView, texel_of};
 use crate::math::{self, at_least};
-use crate::receiver::{Receiver, ReceiverKind, ReceiverLanes};
+use crate::receiver::{Lobe, Receiver, ReceiverKind, ReceiverLanes, SPREAD_OF_SOLID_ANGLE};
 use crate::warp::equal_area::sphere_to_square_quickly;
 use crate::warp::{COLUMNS, SphericalColumns, Variate, keep_positive, pick_pair, pick_wide, pmf_wide};
 
@@ -57,10 +58,10 @@ const LARGEST_CHORD: f32 = 1.4;
 const ARC_OVER_CHORD: f32 = 1.42;
 
 /// A grid of cells on what is visible of a triangle.
-pub(super) struct SphericalGrid<'a> {
+pub(super) struct SphericalGrid<'a, L> {
     visible: VisiblePart,
     receiver: Receiver,
-    lanes: ReceiverLanes,
+    lanes: ReceiverLanes<L>,
     environment: Option<&'a EnvironmentView<'a>>,
 }
 
@@ -240,16 +241,17 @@ impl Step {
     }
 }
 
-impl<'a> SphericalGrid<'a> {
-    /// Returns the grid of a triangle; `None` where there is nothing above the horizon, or too little of it.
+impl<'a, L: Lobe> SphericalGrid<'a, L> {
+    /// Returns the grid of a triangle, with the lobe of the receiver; `None` where there is nothing above the horizon, or too
+    /// little of it.
     #[inline(always)]
-    pub(super) fn new(view: &TriangleView<'a>) -> Option<Self> {
+    pub(super) fn new(view: &TriangleView<'a>, lobe: L) -> Option<Self> {
         let horizon = view.receiver.has_horizon().then(|| view.receiver_normal.as_dvec3());
         let visible = VisiblePart::new(view.exact_vertices, view.determinant, horizon)?;
         (visible.solid_angle() >= LEAST_SOLID_ANGLE).then(|| Self {
             visible,
             receiver: view.receiver,
-            lanes: view.receiver.lanes(Vec3::ZERO),
+            lanes: view.receiver.lanes(Vec3::ZERO).with_lobe(lobe),
             environment: view.environment,
         })
     }
@@ -329,15 +331,24 @@ impl<'a> SphericalGrid<'a> {
                 row: cell.row << SIDE_BITS | row as u32,
                 row_bits: cell.row_bits + SIDE_BITS,
             };
-            let Some(environment) = self.environment else { break };
-            let point = [step.points[0][lane], step.points[1][lane]];
-            if number == MAX_STEPS || environment.is_about_constant(point, step.solid_angles[column % SIDE]) {
+            let solid_angle = step.solid_angles[column % SIDE];
+            let has_constant_radiance = self.environment.is_none_or(|environment| {
+                environment.is_about_constant([step.points[0][lane], step.points[1][lane]], solid_angle)
+            });
+            if number == MAX_STEPS || has_constant_radiance && self.has_constant_lobe(&cell, solid_angle) {
                 break;
             }
         }
         let [width, height] = cell.size();
         let solid_angle = self.visible.triangles()[cell.part].solid_angle() * (width * height);
         Some((cell, pmf / solid_angle))
+    }
+
+    /// Whether the lobe is about constant over a cell.
+    #[inline(always)]
+    fn has_constant_lobe(&self, cell: &GridCell, solid_angle: f32) -> bool {
+        let center = self.visible.triangles()[cell.part].direction(cell.at([0.5, 0.5])).as_vec3();
+        self.lanes.lobe.is_about_constant(center.to_array(), SPREAD_OF_SOLID_ANGLE * solid_angle)
     }
 
     /// Finds the columns from `START` on of the cells of a cell.
@@ -397,8 +408,10 @@ impl<'a> SphericalGrid<'a> {
             for i in 0..SIDE {
                 let m = v * versines[i];
                 let (sin, cos) = (math::sqrt(at_least(m * (2.0 - m), 0.0)), 1.0 - m);
-                let toward = self.lanes.weight_of_cell(pole_cosines[i] * cos + cosines[i] * sin, least[i]);
-                weights[j * SIDE + i] = toward * solid_angles[i];
+                let cosine = self.lanes.weight_of_cell(pole_cosines[i] * cos + cosines[i] * sin, least[i]);
+                let direction = [0, 1, 2].map(|k| poles[k][i] * cos + toward[k][i] * sin);
+                let spread2 = SPREAD_OF_SOLID_ANGLE * solid_angles[i];
+                weights[j * SIDE + i] = self.lanes.lobe.weigh(cosine, direction, 1.0, spread2) * solid_angles[i];
                 if HAS_ENVIRONMENT {
                     let x = local_poles[0][i] * cos + local[0][i] * sin;
                     let y = local_poles[1][i] * cos + local[1][i] * sin;

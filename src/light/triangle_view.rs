@@ -12,7 +12,7 @@ use crate::blas::{CellNode, Draw, Follow, Guide, LEAF, Lattice, LatticeCell, Roo
 use crate::env::{DirectionCone, EnvironmentView};
 use crate::geometry;
 use crate::math;
-use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
+use crate::receiver::{Lobe, Receiver, ReceiverKind, ShadingPoint, for_lobe};
 use crate::simd::{InstructionSet, Kernel};
 use crate::warp::Variate;
 use crate::warp::equal_area::sphere_to_square_quickly;
@@ -148,7 +148,7 @@ impl<'a> TriangleView<'a> {
     /// Descends to a cell of about constant density. Returns it with its probability.
     #[inline(always)]
     fn descend(&self, guide: &mut impl Guide) -> Option<(LatticeCell, f64)> {
-        InstructionSet::best().run(CellDescent { view: self, guide })
+        for_lobe!(self.receiver, lobe => InstructionSet::best().run(CellDescent { view: self, guide, lobe }))
     }
 
     /// Returns the density per solid angle of a point of a cell that was chosen with this probability, `p_A d² / cos θl`.
@@ -200,7 +200,9 @@ impl LightViewKind for TriangleView<'_> {
             if let Some(density) = LinearDensity::new(self) {
                 return density.sample(self, u);
             }
-            if let Some(drawn) = InstructionSet::best().run(SampleDirection { view: self, u }) {
+            let drawn =
+                for_lobe!(self.receiver, lobe => InstructionSet::best().run(SampleDirection { view: self, lobe, u }));
+            if let Some(drawn) = drawn {
                 return drawn;
             }
         }
@@ -218,7 +220,8 @@ impl LightViewKind for TriangleView<'_> {
             if let Some(density) = LinearDensity::new(self) {
                 return density.pdf(self, point);
             }
-            if let Some(pdf) = InstructionSet::best().run(PdfOfDirection { view: self, point }) {
+            let pdf = for_lobe!(self.receiver, lobe => InstructionSet::best().run(PdfOfDirection { view: self, lobe, point }));
+            if let Some(pdf) = pdf {
                 return pdf;
             }
         }
@@ -265,18 +268,20 @@ impl LightViewKind for TriangleView<'_> {
 }
 
 /// Draws a point by its direction. `None` where that is no good and cells are drawn by area.
-struct SampleDirection<'v, 'a> {
+struct SampleDirection<'v, 'a, L> {
     view: &'v TriangleView<'a>,
+    /// Lobe of the view's receiver.
+    lobe: L,
     u: [Variate; 2],
 }
 
-impl Kernel for SampleDirection<'_, '_> {
+impl<L: Lobe> Kernel for SampleDirection<'_, '_, L> {
     type Output = Option<Option<DrawnPoint>>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let Self { view, u } = self;
-        let grid = SphericalGrid::new(view)?;
+        let Self { view, lobe, u } = self;
+        let grid = SphericalGrid::new(view, lobe)?;
         if !view.resolves_directions() {
             return Some(sample_uniformly(view, &grid, u));
         }
@@ -286,7 +291,7 @@ impl Kernel for SampleDirection<'_, '_> {
 
 /// Draws a point by the cells of a grid.
 #[inline(always)]
-fn sample_grid(view: &TriangleView<'_>, grid: &SphericalGrid<'_>, u: [Variate; 2]) -> Option<DrawnPoint> {
+fn sample_grid(view: &TriangleView<'_>, grid: &SphericalGrid<'_, impl Lobe>, u: [Variate; 2]) -> Option<DrawnPoint> {
     let (direction, cell, pdf) = grid.draw(u)?;
     let (barycentrics, _) = geometry::cross_plane(view.exact_vertices, direction)?;
     let point = Lattice::inside(barycentrics);
@@ -298,7 +303,11 @@ fn sample_grid(view: &TriangleView<'_>, grid: &SphericalGrid<'_>, u: [Variate; 2
 /// Draws a point so near that neighbors of the lattice are seen in very different directions: one direction is as likely as
 /// any other, so that the density does not depend on how it was rounded.
 #[cold]
-fn sample_uniformly(view: &TriangleView<'_>, grid: &SphericalGrid<'_>, u: [Variate; 2]) -> Option<DrawnPoint> {
+fn sample_uniformly(
+    view: &TriangleView<'_>,
+    grid: &SphericalGrid<'_, impl Lobe>,
+    u: [Variate; 2],
+) -> Option<DrawnPoint> {
     let direction = grid.draw_uniformly(u);
     let (barycentrics, distance) = geometry::cross_plane(view.exact_vertices, direction)?;
     let point = LocalPoint::on_triangle(Lattice::inside(barycentrics));
@@ -306,18 +315,20 @@ fn sample_uniformly(view: &TriangleView<'_>, grid: &SphericalGrid<'_>, u: [Varia
 }
 
 /// Finds the density of a point that is drawn by its direction. `None` where cells are drawn by area.
-struct PdfOfDirection<'v, 'a> {
+struct PdfOfDirection<'v, 'a, L> {
     view: &'v TriangleView<'a>,
+    /// Lobe of the view's receiver.
+    lobe: L,
     point: Lattice,
 }
 
-impl Kernel for PdfOfDirection<'_, '_> {
+impl<L: Lobe> Kernel for PdfOfDirection<'_, '_, L> {
     type Output = Option<Option<f64>>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let Self { view, point } = self;
-        let grid = SphericalGrid::new(view)?;
+        let Self { view, lobe, point } = self;
+        let grid = SphericalGrid::new(view, lobe)?;
         let relative = view.position(point);
         if !view.resolves_directions() {
             return Some((!view.is_below_horizon(relative)).then(|| grid.uniform_pdf()));
@@ -330,7 +341,7 @@ impl Kernel for PdfOfDirection<'_, '_> {
 #[inline(always)]
 fn density(
     view: &TriangleView<'_>,
-    grid: &SphericalGrid<'_>,
+    grid: &SphericalGrid<'_, impl Lobe>,
     point: DVec3,
     drawn: Option<(GridCell, f64)>,
 ) -> Option<f64> {

@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use super::lobe::{Lobe, NoLobe};
 use crate::geometry::HORIZON_ROUNDING;
 use crate::math::at_least;
 
@@ -13,8 +14,8 @@ use crate::math::at_least;
 /// one makes their samples rarer and brighter.
 pub(crate) const LEAST_CLUSTER_COSINE: f32 = 1e-3;
 
-/// A shading point prepared for the vector loop over the lanes of a node.
-pub(crate) struct ReceiverLanes {
+/// A shading point prepared for the vector loop over the lanes of a node, which is compiled for each kind of lobe.
+pub(crate) struct ReceiverLanes<L = NoLobe> {
     pub(crate) position: Vec3,
     /// Normal that the cosine at the receiver is taken with; zero in a medium.
     pub(crate) normal: Vec3,
@@ -28,6 +29,8 @@ pub(crate) struct ReceiverLanes {
     pub(crate) lift: f32,
     /// Rounding granted to heights over the horizon, relative to distances.
     pub(crate) slack: f32,
+    /// What is favored beyond the cosine.
+    pub(crate) lobe: L,
 }
 
 impl ReceiverLanes {
@@ -41,9 +44,18 @@ impl ReceiverLanes {
         lift: f32,
     ) -> Self {
         let slack = HORIZON_ROUNDING * horizon.abs().element_sum();
-        Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack }
+        Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack, lobe: NoLobe }
     }
 
+    /// Returns the same shading point with a lobe.
+    #[inline(always)]
+    pub(crate) fn with_lobe<L: Lobe>(self, lobe: L) -> ReceiverLanes<L> {
+        let Self { position, normal, cosine_bits, least_cosine, horizon, lift, slack, .. } = self;
+        ReceiverLanes { position, normal, cosine_bits, least_cosine, horizon, lift, slack, lobe }
+    }
+}
+
+impl<L: Lobe> ReceiverLanes<L> {
     /// Returns the mean weight of a small cell of directions by the cosine of its central direction to the normal. `least`
     /// is that of [`ReceiverKind::least_over_directions`](super::ReceiverKind::least_over_directions).
     #[inline(always)]

@@ -3,10 +3,13 @@
 //! Each kind of receiver is a file, which answers the same questions ([`ReceiverKind`]): the weight of a direction, whether
 //! a triangle is dark for certain, the mean over a cone of directions, the weights of the cells of a triangle, the exact
 //! irradiance, and what the loop over the lanes of a tree's node needs. A new kind is a new file, a variant of
-//! [`Receiver`] and a line in `dispatch`.
+//! [`Receiver`] and a line in `dispatch`. If it has a [`Lobe`], that is a line in `for_lobe` as well.
 
+mod glossy;
 mod lambert;
 mod lanes;
+mod lobe;
+mod scattering;
 mod surface;
 mod transmissive;
 mod volume;
@@ -14,7 +17,10 @@ mod volume;
 use glam::Vec3;
 
 use crate::math::at_least;
+pub use glossy::Glossy;
 pub(crate) use lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
+pub(crate) use lobe::{Lobe, NoLobe, SPREAD_OF_RADIUS2, SPREAD_OF_SOLID_ANGLE, for_lobe};
+pub use scattering::Scattering;
 use surface::Surface;
 use transmissive::Transmissive;
 use volume::Volume;
@@ -29,6 +35,10 @@ pub enum Receiver {
     Transmissive(Vec3),
     /// A point in a medium: every direction counts the same.
     Volume,
+    /// An opaque surface with a glossy lobe: what it scatters of the direction.
+    Glossy(Glossy),
+    /// A point in a medium with a phase function: what it scatters of the direction.
+    Scattering(Scattering),
 }
 
 /// A position, and how a direction is weighted there.
@@ -51,12 +61,20 @@ const UNIT_TOLERANCE: f32 = 2e-3;
 impl Receiver {
     /// Returns the same receiver in another frame.
     #[inline]
-    pub(crate) fn map_normal(self, map: impl FnOnce(Vec3) -> Vec3) -> Self {
+    pub(crate) fn map(self, map: impl Fn(Vec3) -> Vec3) -> Self {
         match self {
             Self::Surface(normal) => Self::Surface(map(normal)),
             Self::Transmissive(normal) => Self::Transmissive(map(normal)),
             Self::Volume => Self::Volume,
+            Self::Glossy(surface) => Self::Glossy(surface.map(map)),
+            Self::Scattering(medium) => Self::Scattering(medium.map(map)),
         }
+    }
+
+    /// Whether directions are favored beyond the cosine.
+    #[inline]
+    pub(crate) fn has_lobe(&self) -> bool {
+        matches!(self, Self::Glossy(_) | Self::Scattering(_))
     }
 }
 
@@ -71,6 +89,10 @@ impl ShadingPoint {
             Receiver::Surface(normal) => Receiver::Surface(unit(normal)),
             Receiver::Transmissive(normal) => Receiver::Transmissive(unit(normal)),
             Receiver::Volume => Receiver::Volume,
+            // Without a lobe, the loops need not look for one.
+            Receiver::Glossy(surface) if !surface.has_lobe() => Receiver::Surface(surface.normal()),
+            Receiver::Scattering(medium) if !medium.has_lobe() => Receiver::Volume,
+            receiver @ (Receiver::Glossy(_) | Receiver::Scattering(_)) => receiver,
         };
         Self { position, receiver }
     }
@@ -95,16 +117,45 @@ impl ShadingPoint {
         Self { position, receiver: Receiver::Volume }
     }
 
-    /// Returns the weight of a unit direction that points away from this point: clamped, absolute or no cosine.
+    /// Returns a point on an opaque surface with a glossy lobe.
+    #[must_use]
+    pub fn glossy(position: Vec3, surface: Glossy) -> Self {
+        Self::new(position, Receiver::Glossy(surface))
+    }
+
+    /// Returns a point in a participating medium with a phase function.
+    #[must_use]
+    pub fn scattering(position: Vec3, medium: Scattering) -> Self {
+        Self::new(position, Receiver::Scattering(medium))
+    }
+
+    /// Returns the cosine of a unit direction that points away from this point: clamped on opaque surfaces, absolute on
+    /// transmissive ones, and 1 in a medium.
+    ///
+    /// This is the factor of the estimate beside the host's own BSDF or phase function. A lobe is no part of it.
     #[must_use]
     pub fn cosine(&self, direction: Vec3) -> f32 {
+        match self.receiver {
+            Receiver::Glossy(surface) => Receiver::Surface(surface.normal()).weight(direction),
+            Receiver::Scattering(_) => 1.0,
+            receiver => receiver.weight(direction),
+        }
+    }
+
+    /// Returns the weight that samples follow in a unit direction that points away from this point: the
+    /// [`cosine`](Self::cosine) without a lobe, and with one what the lobe scatters, lobe and cosine together, relative to a
+    /// white diffuse surface or to an isotropic medium.
+    ///
+    /// A target for resampling or a check of parameters; no estimate needs it.
+    #[must_use]
+    pub fn weight(&self, direction: Vec3) -> f32 {
         self.receiver.weight(direction)
     }
 
-    /// Returns the point prepared for the loop over the lanes of a node.
+    /// Returns the point prepared for the loop over the lanes of a node. The lobe is that of the receiver, by [`for_lobe`].
     #[inline(always)]
-    pub(crate) fn lanes(&self) -> ReceiverLanes {
-        self.receiver.lanes(self.position)
+    pub(crate) fn lanes<L: Lobe>(&self, lobe: L) -> ReceiverLanes<L> {
+        self.receiver.lanes(self.position).with_lobe(lobe)
     }
 }
 
@@ -165,21 +216,21 @@ pub(crate) trait ReceiverKind: Copy {
         }
     }
 
-    /// Returns what the weights of cells are made from.
+    /// Returns what the weights of cells are made from, apart from a lobe.
     fn height_weights(self) -> HeightWeights;
 
-    /// Returns the weight of the direction to a center at this mean height and distance.
+    /// Returns the weight of the direction to a center at this mean height and distance, apart from a lobe.
     fn weight_at_height(self, height: f32, inverse_distance: f32) -> f32;
 
-    /// Returns the irradiance over π from a triangle of unit radiance, exact as far as `f32` goes. The vertices are
-    /// relative to the receiver.
+    /// Returns the irradiance over π from a triangle of unit radiance, exact as far as `f32` goes, but for a lobe. The vertices
+    /// are relative to the receiver.
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32;
 
     /// Returns the least mean weight of a small cell of directions, of which the central one is weighed
     /// ([`ReceiverLanes::weight_of_cell`]). It stands in for what the other directions of the cell weigh.
     fn least_over_directions(self, solid_angle: f32) -> f32;
 
-    /// Returns what the loop over the lanes of a node needs.
+    /// Returns what the loop over the lanes of a node needs, apart from a lobe.
     fn lanes(self, position: Vec3) -> ReceiverLanes;
 }
 
@@ -199,6 +250,8 @@ macro_rules! dispatch {
                 let $kind = Volume;
                 $call
             }
+            Receiver::Glossy($kind) => $call,
+            Receiver::Scattering($kind) => $call,
         }
     };
 }

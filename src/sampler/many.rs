@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use super::lights::LightSamplerView;
 #[cfg(doc)]
 use super::point::PointSampler;
-use crate::receiver::ShadingPoint;
+use crate::receiver::{NoLobe, ShadingPoint};
 use crate::record::LightSample;
 use crate::technique::{Variates, Viewpoint};
 use crate::tlas::{Descent, INTERLEAVED};
@@ -17,22 +17,25 @@ impl LightSamplerView<'_> {
     /// The samples are those that [`PointSampler::sample`] draws, but faster: a walk down a large tree mostly waits for
     /// memory, and here several walks are interleaved. Where one slice is longer, the rest of it is left alone.
     pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        // With bright features a sample is mostly the search for them, and with the environment as a light walks are few.
-        if self.scene.has_features() || self.scene.sky.is_some() {
-            let each = queries.iter().zip(samples);
-            return each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));
-        }
         for (queries, samples) in queries.chunks(INTERLEAVED).zip(samples.chunks_mut(INTERLEAVED)) {
-            self.sample_few(queries, samples);
+            // With bright features a sample is mostly the search for them, and with the environment as a light walks are
+            // few. Lobes are of different kinds, and a step goes down for one kind at a time.
+            let is_apart = self.scene.has_features() || self.scene.sky.is_some();
+            if is_apart || queries.iter().any(|(x, _)| x.receiver.has_lobe()) {
+                let each = queries.iter().zip(samples);
+                each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));
+            } else {
+                self.sample_few(queries, samples);
+            }
         }
     }
 
     fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
-        let mut walks = SmallVec::<[Descent<Viewpoint<'_>>; INTERLEAVED]>::new();
+        let mut walks = SmallVec::<[Descent<Viewpoint<'_>, NoLobe>; INTERLEAVED]>::new();
         let mut points = SmallVec::<[[Variate; 2]; INTERLEAVED]>::new();
         for (x, u) in queries {
             let Variates { choice, point } = Variates::new(*u);
-            walks.push(Descent::new(Viewpoint { scene: self.scene, x: *x }, choice));
+            walks.push(Descent::new(Viewpoint { scene: self.scene, x: *x }, NoLobe, choice));
             points.push(point);
         }
         self.scene.tlas.sample_many(&mut walks);

@@ -8,8 +8,10 @@ mod lights;
 mod many;
 mod point;
 mod refit;
+mod resample;
 
 pub use builder::LightSamplerBuilder;
 pub use emission::{Emission, EmissionSample};
 pub use lights::{ByteSizes, LightSampler, LightSamplerView};
 pub use point::PointSampler;
+pub use resample::ResampledLight;

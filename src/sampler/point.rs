@@ -26,7 +26,7 @@ const ENVIRONMENT_DISTANCE: f32 = 1e15;
 #[derive(Debug)]
 #[must_use]
 pub struct PointSampler<'a> {
-    at: Viewpoint<'a>,
+    pub(super) at: Viewpoint<'a>,
     /// Completed in place: a mixture is large, and one that a function returns is copied.
     mixture: RefCell<Mixture>,
 }

@@ -57,14 +57,15 @@ struct Place {
 }
 
 impl Sky {
-    /// Weighs all regions. `None` if nothing can arrive.
+    /// Weighs all regions. `None` if nothing can arrive. Inline, as what is returned otherwise is copied.
+    #[inline(always)]
     pub(super) fn new(at: &Viewpoint<'_>, regions: &RegionMoments) -> Option<Self> {
         if !at.x.position.abs().cmple(Vec3::splat(POSITION_LIMIT)).all() {
             return None;
         }
         let environment = &at.scene.environment;
         let local = |normal: Vec3| Vec3::from_array(environment.local_vector(normal.to_array()));
-        let receiver = at.x.receiver.map_normal(local);
+        let receiver = at.x.receiver.map(local);
         let sums = InstructionSet::best().run(WeighRegions { regions, receiver });
         (sums.total() > 0.0).then_some(Self { sums, receiver })
     }
@@ -114,7 +115,7 @@ impl Sky {
         }
         let probability = f64::from(weight) / f64::from(self.sums.total());
         let mut place = Place { depth: REGION_DEPTH, texel: region, probability };
-        if self.is_cut(at.scene.sky?, number) {
+        if self.receiver.has_lobe() || self.is_cut(at.scene.sky?, number) {
             for depth in REGION_DEPTH + 1..=REGION_DEPTH + CUT_LEVELS {
                 let weights = self.weights_below(&at.scene.environment, place.texel, depth);
                 let total = weights.iter().sum::<f32>();
@@ -139,13 +140,18 @@ impl Sky {
     /// Weights of the four texels of a level below one of the level above. Zero only if nothing can arrive.
     #[inline]
     fn weights_below(&self, environment: &EnvironmentView<'_>, [x, y]: [u32; 2], depth: u32) -> [f32; 4] {
-        [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[i, j]| {
-            let texel = [2 * x + i, 2 * y + j];
+        let texels = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[i, j]| [2 * x + i, 2 * y + j]);
+        let (mut axes, mut sin_radii, mut weights) = ([[0.0; 4]; 3], [0.0; 4], [0.0; 4]);
+        for (i, texel) in texels.into_iter().enumerate() {
             let (axis, sin_radius) = texel_cone(depth, texel);
+            ([axes[0][i], axes[1][i], axes[2][i]], sin_radii[i]) = (axis.to_array(), sin_radius);
+        }
+        self.receiver.means_over_cones(&axes, &sin_radii, &mut weights);
+        for (weight, texel) in weights.iter_mut().zip(texels) {
             let radiance = environment.mean_in(depth, texel);
-            let weight = self.receiver.mean_over_cone(axis, sin_radius);
-            only_if(radiance > 0.0 && weight > 0.0, (radiance * weight).max(f32::MIN_POSITIVE))
-        })
+            *weight = only_if(radiance > 0.0 && *weight > 0.0, (radiance * *weight).max(f32::MIN_POSITIVE));
+        }
+        weights
     }
 }
 

@@ -12,7 +12,7 @@ use super::{Arity, LeafOracle, Splitting, Tlas, TlasView};
 use crate::bounds::{LightBounds, Moments};
 use crate::geometry::{Aabb, Cone};
 use crate::progress::Progress;
-use crate::receiver::ShadingPoint;
+use crate::receiver::{ShadingPoint, for_lobe};
 use crate::simd::InstructionSet;
 use crate::testing::Pcg32;
 use crate::warp::{Variate, seed};
@@ -183,9 +183,12 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let x = &ShadingPoint { position: x.position * scale, ..*x };
         let u = pcg.next_f32();
         let draw = |level: InstructionSet| {
-            let drawn = level.run(SampleWalk { tlas, walk: Descent::new(odd(x), Variate::new(u, seed(&[u]))) });
-            let pmf = drawn.map(|(leaf, _)| level.run(PmfWalk { tlas, leaf, oracle: &odd(x), first: None }).to_bits());
-            (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), pmf)
+            for_lobe!(x.receiver, lobe => {
+                let walk = Descent::new(odd(x), lobe, Variate::new(u, seed(&[u])));
+                let drawn = level.run(SampleWalk { tlas, walk });
+                let pmf = |leaf| level.run(PmfWalk { tlas, leaf, oracle: &odd(x), lobe, first: None }).to_bits();
+                (drawn.map(|(leaf, pmf)| (leaf, pmf.to_bits())), drawn.map(|(leaf, _)| pmf(leaf)))
+            })
         };
         let mut all = InstructionSet::all().map(draw);
         let first = all.next();

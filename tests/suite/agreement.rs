@@ -1,6 +1,6 @@
 //! A density that `sample` reports is the density that is found for the same point later.
 
-use crate::common::hostile::{MOVED, hostile, random_scene, shading_point};
+use crate::common::hostile::{MOVED, hostile, random_scene, shading_point, shading_point_with_lobe};
 use crate::common::lights::{ARITIES, Point, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
@@ -86,13 +86,14 @@ impl Counts {
 }
 
 /// Samples of one random scene. One of `every` is also looked up as a direction.
-fn examine(number: usize, samples: usize, every: usize) -> Counts {
+fn examine(number: usize, samples: usize, every: usize, has_lobe: bool) -> Counts {
     let mut pcg = Pcg32::new(number as u64, 15);
     let scene = random_scene(number, &mut pcg);
     let lights = build(&scene, ARITIES[number % ARITIES.len()]);
     let mut counts = Counts::default();
     for point in 0..POINTS {
-        let x = shading_point(number + point, &scene, &mut pcg);
+        let make = if has_lobe { shading_point_with_lobe } else { shading_point };
+        let x = make(number + point, &scene, &mut pcg);
         let at = lights.at(&x);
         for i in 0..samples / POINTS {
             // A direction leads to the same cell only where the point is not on the rim of one: plain numbers then.
@@ -115,9 +116,9 @@ fn examine(number: usize, samples: usize, every: usize) -> Counts {
     counts
 }
 
-fn examine_all(scenes: usize, samples: usize, every: usize) {
+fn examine_all(scenes: usize, samples: usize, every: usize, has_lobe: bool) {
     let mut all = Counts::default();
-    parallel::map(scenes, |i| examine(i, samples, every)).into_iter().for_each(|counts| all.add(counts));
+    parallel::map(scenes, |i| examine(i, samples, every, has_lobe)).into_iter().for_each(|counts| all.add(counts));
     println!(
         "{} samples, {} of them None: {} mismatches, worst {:e}, {} not finite; {} directions: {} below the sample's \
          density, {} found with another",
@@ -134,13 +135,25 @@ fn examine_all(scenes: usize, samples: usize, every: usize) {
 #[test]
 fn samples_have_the_density_that_pdf_finds() {
     let [scenes, samples] = tier().agreement;
-    examine_all(scenes, samples, 2);
+    examine_all(scenes, samples, 2, false);
+}
+
+#[test]
+fn samples_for_lobes_have_the_density_that_pdf_finds() {
+    let [scenes, samples] = tier().agreement;
+    examine_all(scenes, samples, 2, true);
 }
 
 #[test]
 #[ignore = "by hand: 10^8 samples take minutes; cargo test --release --test suite -- --ignored a_hundred_million"]
 fn a_hundred_million_samples_have_the_density_that_pdf_finds() {
-    examine_all(400, 250_000, 10);
+    examine_all(400, 250_000, 10, false);
+}
+
+#[test]
+#[ignore = "by hand: 10^8 samples take minutes; cargo test --release --test suite -- --ignored a_hundred_million"]
+fn a_hundred_million_samples_for_lobes_have_the_density_that_pdf_finds() {
+    examine_all(400, 250_000, 10, true);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::common::density::{OnTriangle, bin, id, probes};
 use crate::common::lights::{ARITIES, build, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
-use crate::common::scene::{Content, Scene, random_point};
+use crate::common::scene::{Content, Scene, random_point, with_lobe};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
 use crate::common::tier::{some, tier};
 use fanlight::{Arity, Hit, ShadingPoint, Splitting};
@@ -14,6 +14,10 @@ use glam::Vec3;
 const SIGNIFICANCE: f64 = 0.01;
 /// Triangles are cut into 4^DEPTH cells.
 const DEPTH: u32 = 2;
+/// Least roughness of lobes whose densities the integration resolves.
+const LEAST_ROUGHNESS: f32 = 0.1;
+/// Number of the first kind of receiver with a lobe; those below have none.
+const LOBES: usize = 3;
 /// Samples of each cell that guide the integration.
 const PROBES: f64 = 50.0;
 
@@ -24,7 +28,10 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     let scene = Scene::random(&mut pcg, content);
     let arities = ARITIES[number % ARITIES.len()];
     let lights = build(&scene, arities);
-    let x = random_point(&mut pcg, receiver);
+    let mut x = random_point(&mut pcg, receiver);
+    if receiver >= LOBES {
+        x = with_lobe(x, &mut pcg, LEAST_ROUGHNESS);
+    }
     let bins = 1 << (2 * DEPTH);
     let samples = tier().histogram;
     let mut firsts = Vec::new();
@@ -97,13 +104,23 @@ fn contents() -> Vec<Content> {
 
 #[test]
 fn samples_fill_the_cells_of_triangles_as_the_density_says() {
+    check_cells(0);
+}
+
+#[test]
+fn samples_for_lobes_fill_the_cells_of_triangles_as_the_density_says() {
+    check_cells(LOBES);
+}
+
+/// With three kinds of receivers from `first` on.
+fn check_cells(first: usize) {
     let contents = contents();
     let numbers = some(3 * contents.len());
     let count = numbers.len();
     let significance = sidak(SIGNIFICANCE, count);
     let found = parallel::map(count, |k| {
         let i = numbers[k];
-        cells(contents[i / 3], i / 3, i % 3, false)
+        cells(contents[i / 3], i / 3, first + i % 3, false)
     });
     let failed: Vec<_> = found.iter().filter(|(p, _)| *p < significance).collect();
     failed.iter().for_each(|(_, dump)| eprintln!("{dump}"));

@@ -4,7 +4,7 @@ use crate::common::hostile::hostile;
 use crate::common::lights::aligned;
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
-use crate::common::scene::random_point;
+use crate::common::scene::{random_point, with_lobe};
 use crate::common::statistics::{Mean, chi_square, sidak};
 use fanlight::{
     Environment, Filter, LightSample, LightSampler, LightSamplerView, Mesh, PointSampler, Receiver, SampledLight,
@@ -65,6 +65,12 @@ fn points(count: usize, sequence: u64) -> Vec<ShadingPoint> {
     (0..count).map(point).collect()
 }
 
+/// The same points with lobes.
+fn points_with_lobes(count: usize, sequence: u64) -> Vec<ShadingPoint> {
+    let mut pcg = Pcg32::new(18, sequence);
+    points(count, sequence).into_iter().map(|x| with_lobe(x, &mut pcg, 0.1)).collect()
+}
+
 /// All skies with all scenes.
 fn cases() -> Vec<(&'static str, &'static str)> {
     SKIES.iter().flat_map(|sky| SCENES.map(|scene| (*sky, scene))).collect()
@@ -103,7 +109,8 @@ fn the_density_of_directions_integrates_to_the_rate_of_samples() {
         let (sky, scene) = cases[i];
         let lights = build(sky, scene);
         // Each sky with each scene at one kind of receiver.
-        for x in points(3, i as u64).into_iter().skip((i + i / 3) % 3).take(1) {
+        let number = (i + i / 3) % 3;
+        for x in [points(3, i as u64)[number], points_with_lobes(3, i as u64)[number]] {
             let at = lights.at(&x);
             let mut sum = 0.0;
             let step = over_sphere(|direction, _| sum += f64::from(at.pdf_direction(direction)));
@@ -120,11 +127,12 @@ fn the_density_of_directions_integrates_to_the_rate_of_samples() {
 #[test]
 fn directions_are_drawn_with_their_density() {
     let cases = cases();
-    let significance = sidak(0.01, cases.len());
+    let significance = sidak(0.01, 2 * cases.len());
     parallel::map(cases.len(), |i| {
         let (sky, scene) = cases[i];
         let lights = build(sky, scene);
-        for x in points(3, 100 + i as u64).into_iter().skip((i + i / 3) % 3).take(1) {
+        let (number, sequence) = ((i + i / 3) % 3, 100 + i as u64);
+        for x in [points(3, sequence)[number], points_with_lobes(3, sequence)[number]] {
             let at = lights.at(&x);
             let mut expected = [0.0; 128];
             over_sphere(|direction, bin| expected[bin] += f64::from(at.pdf_direction(direction)));
@@ -166,7 +174,7 @@ fn samples_have_the_density_that_is_found_later() {
         let lights = build(sky, scene);
         let mut pcg = Pcg32::new(6, i as u64);
         let mut count = 0;
-        for x in points(30, 200 + i as u64) {
+        for x in points(30, 200 + i as u64).into_iter().chain(points_with_lobes(30, 300 + i as u64)) {
             let at = lights.at(&x);
             for _ in 0..300 {
                 let Some(sample) = at.sample(core::array::from_fn(|_| hostile(&mut pcg))) else { continue };

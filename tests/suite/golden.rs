@@ -4,7 +4,7 @@
 //! or, without `std`, from `libm`, so that there is a list for each, and they hold for the system that they were made on.
 use std::path::Path;
 
-use crate::common::hostile::{random_scene, shading_point};
+use crate::common::hostile::{random_scene, shading_point, shading_point_with_lobe};
 use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
@@ -18,6 +18,8 @@ const POINTS: usize = 60;
 const KINDS: usize = 12;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
+/// The same scenes at points with lobes.
+const LOBES: &str = if cfg!(feature = "std") { "lobes-std.txt" } else { "lobes-libm.txt" };
 
 /// FNV-1a over the bits of numbers.
 struct Hash(u64);
@@ -74,14 +76,15 @@ fn ask_environment(scene: &Scene, pcg: &mut Pcg32, hash: &mut Hash) {
 }
 
 /// One line about one scene.
-fn line(number: usize) -> String {
+fn line(number: usize, has_lobes: bool) -> String {
     let mut pcg = Pcg32::new(number as u64, 81);
     let scene = random_scene(number, &mut pcg);
     let arity = ARITIES[number % ARITIES.len()];
     let lights = build(&scene, arity);
     let mut hash = Hash::new();
     let mut drawn = 0;
-    let points: Vec<_> = (0..POINTS).map(|i| shading_point(number + i, &scene, &mut pcg)).collect();
+    let make = if has_lobes { shading_point_with_lobe } else { shading_point };
+    let points: Vec<_> = (0..POINTS).map(|i| make(number + i, &scene, &mut pcg)).collect();
     for x in &points {
         drawn += ask(&lights, x, &mut pcg, &mut hash);
     }
@@ -117,14 +120,21 @@ fn line_of_kinds(number: usize) -> String {
     format!("{number:2} kinds {drawn:5} {:016x}\n", hash.0)
 }
 
-fn all() -> String {
-    parallel::map(SCENES + KINDS, |i| if i < SCENES { line(i) } else { line_of_kinds(i - SCENES) }).concat()
+#[test]
+fn samples_and_densities_are_those_of_before() {
+    compare(LIST, false);
 }
 
 #[test]
-fn samples_and_densities_are_those_of_before() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(LIST);
-    let found = all();
+fn samples_and_densities_of_lobes_are_those_of_before() {
+    compare(LOBES, true);
+}
+
+fn compare(list: &str, has_lobes: bool) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
+    let kinds = if has_lobes { 0 } else { KINDS };
+    let line = |i| if i < SCENES { line(i, has_lobes) } else { line_of_kinds(i - SCENES) };
+    let found = parallel::map(SCENES + kinds, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {
         std::fs::write(&path, found).expect("the list can be written");
         panic!("{} is written, and nothing was compared", path.display());

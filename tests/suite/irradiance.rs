@@ -6,7 +6,7 @@
 
 use crate::common::lights::{ARITIES, build, sample_split};
 use crate::common::pcg::Pcg32;
-use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky, random_point};
+use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky, random_point, with_lobe};
 use crate::common::statistics::Mean;
 use crate::common::tier::tier;
 use crate::common::{oracle, parallel};
@@ -287,6 +287,36 @@ fn transmissive_surfaces() {
 fn volumes() {
     let scene = |pcg: &mut Pcg32, _| mixture(pcg, 2);
     assert_unbiased(&Case { name: "volumes", scene, integral: over_lights, estimator: Estimator::Point });
+}
+
+/// Their estimates are those of hosts whose BSDF is the lobe.
+#[test]
+fn glossy_surfaces() {
+    let scene = |pcg: &mut Pcg32, _| {
+        let (scene, x) = mixture(pcg, 0);
+        (scene, with_lobe(x, pcg, 0.05))
+    };
+    assert_unbiased(&Case { name: "glossy surfaces", scene, integral: over_lights, estimator: Estimator::Point });
+}
+
+#[test]
+fn phase_functions() {
+    let scene = |pcg: &mut Pcg32, _| {
+        let (scene, x) = mixture(pcg, 2);
+        (scene, with_lobe(x, pcg, 0.05))
+    };
+    assert_unbiased(&Case { name: "phase functions", scene, integral: over_lights, estimator: Estimator::Point });
+}
+
+/// The host's lobe need not be the one that guides.
+#[test]
+fn openings_seen_with_lobes() {
+    let scene = |pcg: &mut Pcg32, number| {
+        let scene = window(1, pcg);
+        let x = below_window(pcg, number);
+        (scene, with_lobe(x, pcg, 0.1))
+    };
+    assert_unbiased(&Case { name: "openings, lobes", scene, integral: over_lights, estimator: Estimator::Direction });
 }
 
 #[test]

@@ -1,55 +1,81 @@
-//! Glossy receivers: how much noise there is if light is sampled without regard to the lobe, if the lobe alone is
-//! sampled, if both are and weighted by the balance heuristic, and if a triangle could be chosen by its product with
-//! the lobe.
+//! Glossy receivers: how much noise there is if lights are sampled with and without regard to the lobe, if the lobe alone is
+//! sampled, and if both are, weighted by the balance heuristic.
 //!
-//! The lobe is normalised, cosine-powered around a random direction above the horizon that meets a light, and stands
-//! for the product of a BSDF and the cosine. Emitters do not cover each other: a ray sees all that it crosses.
+//! The receiver reflects `kd cos θ / π + ks D G / (4 cos θo)`, GGX with height-correlated masking and without Fresnel. Emitters
+//! do not cover each other: a ray sees all that it crosses.
 
-use core::f64::consts::{PI, TAU};
+use core::f64::consts::{FRAC_1_PI, PI, TAU};
 
-use ::fanlight::{Receiver, ShadingPoint};
-use glam::DVec3;
+use ::fanlight::{Glossy, Receiver, ShadingPoint};
+use glam::{DMat3, DVec3};
 
 use crate::args::Args;
-use crate::methods::{Cumulative, Drawn, Fanlight, Method, OnTriangle, barycentrics, crosses};
-use crate::metrics::summary;
+use crate::methods::{Drawn, Fanlight, Method, barycentrics, crosses};
+use crate::metrics::{Summary, summary};
 use crate::parallel::parallel;
 use crate::report::short;
 use crate::scenes::pcg::Pcg32;
 use crate::scenes::{self, Scene};
 
-const WORKLOADS: [&str; 2] = ["cloud-10000", "quad"];
-const EXPONENTS: [i32; 3] = [10, 100, 1000];
-const NAMES: [&str; 4] = ["light", "lobe", "both, balanced", "choice by product"];
-/// Directions to try until one meets a light.
-const TRIES: usize = 1000;
-/// Number of lights from which it matters which is chosen.
-const MANY: usize = 3;
-/// Least share of the lobe's peak that the choice by product sees.
-const LEAST_LOBE: f64 = 1e-3;
+/// Scenes with the names of their workloads, roughnesses and shares of the diffuse part.
+const WORKLOADS: [(&str, &str, &[f64], &[f64]); 3] = [
+    ("cloud-10000", "lobe", &[0.01, 0.02, 0.05, 0.1, 0.2, 0.4], &[0.0, 0.5]),
+    ("window", "lobe-window", &[0.05, 0.1, 0.2, 0.4], &[0.0]),
+    ("quad", "lobe-quad", &[0.05, 0.1, 0.2, 0.4], &[0.0]),
+];
+const METHODS: [&str; 5] = ["light", "light@lobe", "bsdf", "pair", "pair@lobe"];
 
-/// `(m + 1) / 2π cos^m` of the angle to an axis, zero below the horizon.
+/// What the receiver reflects.
 struct Lobe {
-    axis: DVec3,
-    normal: DVec3,
-    exponent: i32,
+    /// Tangent, bitangent and normal.
+    frame: DMat3,
+    /// Outgoing direction in the frame.
+    outgoing: DVec3,
+    alpha: f64,
+    diffuse: f64,
 }
 
 impl Lobe {
-    fn value(&self, direction: DVec3) -> f64 {
-        let cosine = self.axis.dot(direction);
-        if cosine <= 0.0 || self.normal.dot(direction) <= 0.0 {
-            return 0.0;
-        }
-        f64::from(self.exponent + 1) / TAU * cosine.powi(self.exponent)
+    fn lambda(&self, cosine: f64) -> f64 {
+        let tangent2 = (1.0 - cosine * cosine).max(0.0) / (cosine * cosine);
+        0.5 * ((1.0 + self.alpha * self.alpha * tangent2).sqrt() - 1.0)
     }
 
+    /// Reflected share of the radiance from a direction above the surface, and the density of [`Self::sample`]; the part that
+    /// both have in common.
+    fn value_and_pdf(&self, direction: DVec3) -> (f64, f64) {
+        let direction = self.frame.transpose() * direction;
+        if direction.z <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let h = (direction + self.outgoing).normalize();
+        let alpha2 = self.alpha * self.alpha;
+        let tail = h.x * h.x + h.y * h.y + alpha2 * h.z * h.z;
+        let distribution = alpha2 / (PI * tail * tail) / (4.0 * self.outgoing.z);
+        let (of_o, of_i) = (self.lambda(self.outgoing.z), self.lambda(direction.z));
+        let (diffuse, glossy) = (self.diffuse * direction.z * FRAC_1_PI, (1.0 - self.diffuse) * distribution);
+        (diffuse + glossy / (1.0 + of_o + of_i), diffuse + glossy / (1.0 + of_o))
+    }
+
+    /// Draws a direction, through a visible normal (Heitz 2018) or in proportion to the cosine.
     fn sample(&self, pcg: &mut Pcg32) -> DVec3 {
-        let cosine = pcg.f().powf(1.0 / f64::from(self.exponent + 1));
-        let (sin_phi, cos_phi) = (TAU * pcg.f()).sin_cos();
-        let (s, t) = self.axis.any_orthonormal_pair();
-        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-        self.axis * cosine + (s * cos_phi + t * sin_phi) * sine
+        let (is_diffuse, u, v) = (pcg.f() < self.diffuse, pcg.f(), pcg.f());
+        let (sin, cos) = (TAU * v).sin_cos();
+        let (x, y) = (u.sqrt() * cos, u.sqrt() * sin);
+        if is_diffuse {
+            return self.frame * DVec3::new(x, y, (1.0 - u).max(0.0).sqrt());
+        }
+        let stretch = DVec3::new(self.alpha, self.alpha, 1.0);
+        let view = (self.outgoing * stretch).normalize();
+        let (s, t) = view.any_orthonormal_pair();
+        // `t` along the projection of the normal, as the disk is squeezed there.
+        let up = DVec3::Z - view * view.z;
+        let (s, t) = if up.length_squared() > 1e-12 { (up.normalize().cross(view), up.normalize()) } else { (s, t) };
+        let share = 0.5 * (1.0 + view.z);
+        let y = (1.0 - share) * (1.0 - x * x).max(0.0).sqrt() + share * y;
+        let normal = s * x + t * y + view * (1.0 - x * x - y * y).max(0.0).sqrt();
+        let normal = (normal * DVec3::new(self.alpha, self.alpha, 1.0)).normalize();
+        self.frame * (2.0 * normal.dot(self.outgoing) * normal - self.outgoing)
     }
 }
 
@@ -57,100 +83,129 @@ impl Lobe {
 struct View<'a> {
     scene: &'a Scene,
     method: &'a Fanlight<'a>,
-    /// Mean weight of every light.
-    means: &'a [f64],
-    x: ShadingPoint,
+    /// The point without the lobe, and with it.
+    points: [ShadingPoint; 2],
     lobe: Lobe,
     /// Lights whose front is seen, relative to the point.
     lights: Vec<(usize, [DVec3; 3])>,
 }
 
-pub(crate) fn run(args: &Args) {
+/// One row.
+pub(crate) struct LobeRow {
+    pub(crate) workload: String,
+    pub(crate) method: &'static str,
+    pub(crate) points: usize,
+    pub(crate) relvar: Summary,
+}
+
+pub(crate) fn run(args: &Args) -> Vec<LobeRow> {
     println!("\nGlossy receivers: relative variance of one sample (of a pair, times two, for both)");
-    println!("{:12} {:>8} {:20} {:>8} {:>8} {:>8}", "workload", "exponent", "sampling", "relvar", "p90", "EW");
-    for workload in WORKLOADS.iter().filter(|workload| args.wants(workload)) {
-        let scene = scenes::scene(workload);
-        let method = Fanlight::new(&scene);
-        let means: Vec<f64> = (0..scene.lights.len()).map(|light| scene.mean_weight(light)).collect();
-        let points = scene.points.quality(args.effort.study_points);
-        for exponent in EXPONENTS {
-            let at_point = |i: usize, x: &ShadingPoint| {
-                let mut pcg = Pcg32::new(i as u64, 9);
-                View::new(&scene, (&method, &means), *x, exponent, &mut pcg)?.measure(args.effort.samples, &mut pcg)
-            };
-            let measured: Vec<_> = parallel(&points, at_point).into_iter().flatten().collect();
-            let names = if scene.lights.len() < MANY { &NAMES[..3] } else { &NAMES[..] };
-            for (i, name) in names.iter().enumerate() {
-                let Some(s) = summary(measured.iter().map(|(variances, e2)| (variances[i], *e2))) else { continue };
-                let [median, p90, mean] = [s.median, s.p90, s.energy_weighted].map(short);
-                println!("{workload:12} {exponent:>8} {name:20} {median:>8} {p90:>8} {mean:>8}");
+    println!("{:20} {:12} {:>6} {:>8} {:>8} {:>8}", "workload", "method", "points", "relvar", "p90", "EW");
+    let mut rows = vec![];
+    for (scene, name, roughnesses, shares) in WORKLOADS {
+        for (alpha, diffuse) in roughnesses.iter().flat_map(|alpha| shares.iter().map(move |kd| (*alpha, *kd))) {
+            let workload =
+                if scene == "cloud-10000" { format!("{name}-{alpha}-{diffuse}") } else { format!("{name}-{alpha}") };
+            if args.wants(&workload) || args.wants(scene) {
+                rows.extend(workload_rows(&workload, &scenes::scene(scene), [alpha, diffuse], args));
             }
         }
     }
+    rows
+}
+
+fn workload_rows(workload: &str, scene: &Scene, [alpha, diffuse]: [f64; 2], args: &Args) -> Vec<LobeRow> {
+    let method = Fanlight::new(scene);
+    let mut pcg = Pcg32::new(34, 2);
+    let points: Vec<_> = scene.points.quality(args.effort.points).into_iter().map(|x| (x, pcg.direction())).collect();
+    let at_point = |i: usize, (x, outgoing): &(ShadingPoint, DVec3)| {
+        let mut pcg = Pcg32::new(i as u64, 9);
+        View::new(scene, &method, x, *outgoing, [alpha, diffuse]).measure(args.effort.samples, &mut pcg)
+    };
+    let measured: Vec<_> = parallel(&points, at_point).into_iter().flatten().collect();
+    let mut rows = vec![];
+    for (i, name) in METHODS.into_iter().enumerate() {
+        let Some(s) = summary(measured.iter().map(|(variances, e2)| (variances[i], *e2))) else { continue };
+        let [median, p90, mean] = [s.median, s.p90, s.energy_weighted].map(short);
+        println!("{workload:20} {name:12} {:>6} {median:>8} {p90:>8} {mean:>8}", measured.len());
+        rows.push(LobeRow { workload: workload.to_owned(), method: name, points: measured.len(), relvar: s });
+    }
+    rows
 }
 
 impl<'a> View<'a> {
     fn new(
         scene: &'a Scene,
-        (method, means): (&'a Fanlight<'a>, &'a [f64]),
-        x: ShadingPoint,
-        exponent: i32,
-        pcg: &mut Pcg32,
-    ) -> Option<Self> {
+        method: &'a Fanlight<'a>,
+        x: &ShadingPoint,
+        outgoing: DVec3,
+        [alpha, diffuse]: [f64; 2],
+    ) -> Self {
         let Receiver::Surface(normal) = x.receiver else { panic!("all workloads have opaque surfaces") };
-        let normal = normal.as_dvec3();
         let relative = |l: usize| (l, scene.lights[l].vertices.map(|v| v - x.position.as_dvec3()));
         let is_front =
             |(l, vertices): &(usize, [DVec3; 3])| scene.lights[*l].normal_and_area().0.dot(vertices[0]) < 0.0;
         let lights: Vec<_> = (0..scene.lights.len()).map(relative).filter(is_front).collect();
-        let meets = |axis: &DVec3| axis.dot(normal) > 0.0 && lights.iter().any(|(_, v)| crosses(v, *axis));
-        let axis = (0..TRIES).map(|_| pcg.direction()).find(meets)?;
-        Some(Self { scene, method, means, x, lobe: Lobe { axis, normal, exponent }, lights })
+        let n = normal.as_dvec3().normalize();
+        let outgoing = if outgoing.dot(n) < 0.0 { -outgoing } else { outgoing };
+        let glossy =
+            Glossy::new(normal, outgoing.as_vec3(), alpha as f32).with_weights(diffuse as f32, (1.0 - diffuse) as f32);
+        let (s, t) = n.any_orthonormal_pair();
+        let frame = DMat3::from_cols(s, t, n);
+        let lobe = Lobe { frame, outgoing: frame.transpose() * outgoing, alpha, diffuse };
+        Self { scene, method, points: [*x, ShadingPoint::glossy(x.position, glossy)], lobe, lights }
     }
 
-    /// Variances of all ways of sampling, and the squared mean. `None` where nothing arrives.
-    fn measure(&self, samples: usize, pcg: &mut Pcg32) -> Option<([f64; 4], f64)> {
-        let product = self.product();
-        let (mut light, mut lobe) = (Moments::default(), Moments::default());
-        // Second moments of light sampling (by light and lobe samples together) and of lobe sampling.
-        let (mut of_light, mut of_lobe, mut of_product) = (0.0, 0.0, 0.0);
+    /// Variances of all methods, and the squared mean. `None` where nothing arrives.
+    fn measure(&self, samples: usize, pcg: &mut Pcg32) -> Option<([f64; 5], f64)> {
+        // Second moments of light sampling, by samples of lights and of the lobe together, and the halves of pairs.
+        let mut of_light = [0.0; 2];
+        let (mut halves, mut of_lobe) = ([[Moments::default(); 2]; 2], 0.0);
         for _ in 0..samples {
-            let mut estimate = 0.0;
-            if let Some(drawn) = self.method.sample(&self.x, pcg.uniform3()) {
-                let (f, p) = (self.weight(&drawn) * self.lobe(&drawn), drawn.pdf + self.lobe(&drawn));
-                estimate = f / p;
-                of_light += f * f / (drawn.pdf * p);
+            for (k, x) in self.points.iter().enumerate() {
+                let mut estimate = 0.0;
+                if let Some(drawn) = self.method.sample(x, pcg.uniform3()) {
+                    let (value, pdf) = self.lobe.value_and_pdf(drawn.direction.as_dvec3());
+                    let f = self.weight(&drawn) * value;
+                    estimate = f / (drawn.pdf + pdf);
+                    of_light[k] += f * f / (drawn.pdf * (drawn.pdf + pdf));
+                }
+                halves[k][0].add(estimate);
             }
-            light.add(estimate);
             let direction = self.lobe.sample(pcg);
-            let (mut estimate, mut seen) = (0.0, 0.0);
-            for drawn in self.hits(direction) {
-                let (pdf, density) = (self.method.pdf(&self.x, &drawn), self.lobe(&drawn));
-                let weight = self.weight(&drawn);
-                seen += weight;
-                estimate += weight * density / (pdf + density);
-                if pdf > 0.0 {
-                    of_light += (weight * density).powi(2) / (pdf * (pdf + density));
+            let (value, pdf) = self.lobe.value_and_pdf(direction);
+            let (mut estimates, mut seen) = ([0.0; 2], 0.0);
+            if value > 0.0 {
+                for drawn in self.hits(direction) {
+                    let f = self.weight(&drawn) * value;
+                    seen += f / pdf;
+                    for (k, x) in self.points.iter().enumerate() {
+                        let p = self.method.pdf(x, &drawn);
+                        estimates[k] += f / (p + pdf);
+                        if p > 0.0 {
+                            of_light[k] += f * f / (p * (p + pdf));
+                        }
+                    }
                 }
             }
-            lobe.add(estimate);
+            (0..2).for_each(|k| halves[k][1].add(estimates[k]));
             of_lobe += seen * seen;
-            of_product += self.sample_product(&product, pcg);
         }
         let count = samples as f64;
-        let mean = (light.sum + lobe.sum) / count;
+        let mean = (halves[1][0].sum + halves[1][1].sum) / count;
         let e2 = mean * mean;
-        let both = 2.0 * (light.variance() + lobe.variance());
-        let variances = [of_light / count - e2, of_lobe / count - e2, both, of_product / count - e2];
+        let pair = |k: usize| 2.0 * (halves[k][0].variance() + halves[k][1].variance());
+        let variances = [of_light[0] / count - e2, of_light[1] / count - e2, of_lobe / count - e2, pair(0), pair(1)];
         (mean > 0.0).then_some((variances.map(|v| v.max(0.0)), e2))
     }
 
+    /// Radiance from a point of a light.
     fn weight(&self, drawn: &Drawn) -> f64 {
-        self.scene.weight(drawn.light, drawn.barycentrics.map(f64::from))
-    }
-
-    fn lobe(&self, drawn: &Drawn) -> f64 {
-        self.lobe.value(drawn.direction.as_dvec3())
+        let weight = self.scene.weight(drawn.light, drawn.barycentrics.map(f64::from));
+        match &self.scene.sky {
+            Some(sky) => weight * f64::from(sky.environment.radiance(drawn.direction)),
+            None => weight,
+        }
     }
 
     /// All points that a ray crosses.
@@ -163,36 +218,12 @@ impl<'a> View<'a> {
             pdf: 0.0,
             radiance: None,
         };
-        let is_above = self.lobe.normal.dot(direction) > 0.0;
-        self.lights.iter().filter(move |_| is_above).filter(is_crossed).map(drawn)
-    }
-
-    /// What each light sends, times the lobe's mean at its centre and vertices.
-    fn product(&self) -> Cumulative {
-        let peak = f64::from(self.lobe.exponent + 1) / TAU;
-        Cumulative::new(self.lights.iter().map(|(light, [a, b, c])| {
-            let center = (*a + *b + *c) / 3.0;
-            let cross = (*b - *a).cross(*c - *a);
-            let distance2 = center.length_squared();
-            let solid_angle = 0.5 * cross.dot(center).abs() / (distance2 * distance2.sqrt());
-            let places = [center, *a, *b, *c].map(|place| self.lobe.value(place.normalize()));
-            let lobe = (places.iter().sum::<f64>() / 4.0).max(LEAST_LOBE * peak);
-            self.means[*light] * solid_angle.min(2.0 * PI) * lobe
-        }))
-    }
-
-    /// Squared estimate of a sample whose triangle is chosen by its product, uniform over its solid angle.
-    fn sample_product(&self, product: &Cumulative, pcg: &mut Pcg32) -> f64 {
-        let chosen = product.sample(pcg.f() as f32);
-        let (light, vertices) = self.lights[chosen];
-        let (direction, place, density) = OnTriangle::SolidAngle.sample(&vertices, [pcg.f(), pcg.f()]);
-        let f = self.scene.weight(light, place) * self.lobe.value(direction);
-        (f / (product.pmf(chosen) * density)).powi(2)
+        self.lights.iter().filter(is_crossed).map(drawn)
     }
 }
 
 /// Of the estimates by one kind of samples.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 struct Moments {
     count: f64,
     sum: f64,

@@ -7,7 +7,7 @@ use crate::blas::{CellNode, LEAF, Lattice, Root};
 use crate::env::{Environment, EnvironmentImage};
 use crate::light::linear_density::LinearDensity;
 use crate::light::{DrawnPoint, Illumination, LightTriangle, LightViewKind, LocalPoint, TriangleView};
-use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
+use crate::receiver::{NoLobe, Receiver, ReceiverKind, ShadingPoint};
 use crate::testing::{Pcg32, chi_square, chi_square_limit};
 use crate::warp::{SphericalTriangle, Variate, seed};
 
@@ -155,7 +155,7 @@ fn samples_follow_the_density() {
             let view =
                 TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
             let Some(view) = view.filter(|view| LinearDensity::new(view).is_none()) else { continue };
-            let Some(grid) = SphericalGrid::new(&view) else { continue };
+            let Some(grid) = SphericalGrid::new(&view, NoLobe) else { continue };
             let mut expected = [0.0; 2 * BINS * BINS];
             let bin = |(part, point): (usize, [f64; 2])| {
                 let [i, j] = point.map(|x| ((x * BINS as f64) as usize).min(BINS - 1));
@@ -275,7 +275,7 @@ fn drawn_directions_lie_in_their_cells() {
         for (light, x) in scenes(&mut pcg, 50) {
             let view =
                 TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
-            let Some(grid) = view.as_ref().and_then(SphericalGrid::new) else { continue };
+            let Some(grid) = view.as_ref().and_then(|view| SphericalGrid::new(view, NoLobe)) else { continue };
             for _ in 0..100 {
                 let Some((direction, cell, _)) = grid.draw(numbers(&mut pcg)) else { continue };
                 all += 1.0;

@@ -1,7 +1,7 @@
 //! From the root to a leaf, and from a leaf back to the root: the same weights decide both.
 
 use super::importance::LeafOracle;
-use crate::receiver::ReceiverLanes;
+use crate::receiver::{Lobe, ReceiverLanes, for_lobe};
 use crate::simd::{InstructionSet, Kernel, prefetch};
 use crate::tlas::arity::MAX_LANES;
 use crate::tlas::node::{Child, Node};
@@ -13,8 +13,8 @@ use crate::warp::{Variate, pick_wide, pmf_wide};
 pub(crate) const INTERLEAVED: usize = 8;
 
 /// A way down the tree, as far as it has got.
-pub(crate) struct Descent<S> {
-    receiver: ReceiverLanes,
+pub(crate) struct Descent<S, L> {
+    receiver: ReceiverLanes<L>,
     oracle: S,
     u: Variate,
     node: u32,
@@ -24,11 +24,11 @@ pub(crate) struct Descent<S> {
     end: Option<Option<u32>>,
 }
 
-impl<S: LeafOracle> Descent<S> {
-    /// Starts at the root.
+impl<S: LeafOracle, L: Lobe> Descent<S, L> {
+    /// Starts at the root. The lobe is that of the receiver.
     #[inline(always)]
-    pub(crate) fn new(oracle: S, u: Variate) -> Self {
-        Self { receiver: oracle.shading_point().lanes(), oracle, u, node: 0, pmf: 1.0, end: None }
+    pub(crate) fn new(oracle: S, lobe: L, u: Variate) -> Self {
+        Self { receiver: oracle.shading_point().lanes(lobe), oracle, u, node: 0, pmf: 1.0, end: None }
     }
 
     /// Returns the leaf that was drawn, with its probability.
@@ -83,12 +83,12 @@ impl FirstWeights {
 }
 
 /// One way down to a leaf.
-pub(in crate::tlas) struct SampleWalk<'a, const N: usize, S> {
+pub(in crate::tlas) struct SampleWalk<'a, const N: usize, S, L> {
     pub(in crate::tlas) tlas: &'a WideTree<'a, N>,
-    pub(in crate::tlas) walk: Descent<S>,
+    pub(in crate::tlas) walk: Descent<S, L>,
 }
 
-impl<const N: usize, S: LeafOracle> Kernel for SampleWalk<'_, N, S> {
+impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for SampleWalk<'_, N, S, L> {
     type Output = Option<(u32, f64)>;
 
     #[inline(always)]
@@ -102,12 +102,12 @@ impl<const N: usize, S: LeafOracle> Kernel for SampleWalk<'_, N, S> {
 
 /// Several ways down, interleaved by steps, and each step in two halves: while one way waits for memory or for sums, the
 /// others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
-struct InterleavedWalks<'a, const N: usize, S> {
+struct InterleavedWalks<'a, const N: usize, S, L> {
     tlas: &'a WideTree<'a, N>,
-    walks: &'a mut [Descent<S>],
+    walks: &'a mut [Descent<S, L>],
 }
 
-impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
+impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for InterleavedWalks<'_, N, S, L> {
     type Output = ();
 
     #[inline(always)]
@@ -131,22 +131,23 @@ impl<const N: usize, S: LeafOracle> Kernel for InterleavedWalks<'_, N, S> {
 }
 
 /// The way back from a leaf: the probability that [`SampleWalk`] draws it.
-pub(in crate::tlas) struct PmfWalk<'a, const N: usize, S> {
+pub(in crate::tlas) struct PmfWalk<'a, const N: usize, S, L> {
     pub(in crate::tlas) tlas: &'a WideTree<'a, N>,
     pub(in crate::tlas) leaf: u32,
     pub(in crate::tlas) oracle: &'a S,
+    pub(in crate::tlas) lobe: L,
     /// Weights of the root, if they are known.
     pub(in crate::tlas) first: Option<&'a FirstWeights>,
 }
 
-impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
+impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for PmfWalk<'_, N, S, L> {
     type Output = f64;
 
     #[inline(always)]
     fn run(self) -> f64 {
         // The way is short to find, but its nodes are far apart in memory.
         self.tlas.path(self.leaf).for_each(|(node, _)| prefetch(&self.tlas.nodes[node]));
-        let receiver = self.oracle.shading_point().lanes();
+        let receiver = self.oracle.shading_point().lanes(self.lobe);
         let mut pmf = 1.0;
         // Not a fold, whose closure would be compiled for the baseline.
         for (node, lane) in self.tlas.path(self.leaf) {
@@ -160,25 +161,27 @@ impl<const N: usize, S: LeafOracle> Kernel for PmfWalk<'_, N, S> {
 }
 
 /// The weights of one node.
-struct NodeWeights<'a, const N: usize, S> {
+struct NodeWeights<'a, const N: usize, S, L> {
     tlas: &'a WideTree<'a, N>,
     node: usize,
     oracle: &'a S,
+    lobe: L,
 }
 
-impl<const N: usize, S: LeafOracle> Kernel for NodeWeights<'_, N, S> {
+impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for NodeWeights<'_, N, S, L> {
     type Output = [f32; N];
 
     #[inline(always)]
     fn run(self) -> [f32; N] {
-        self.tlas.weights(self.node, &self.oracle.shading_point().lanes(), self.oracle)
+        self.tlas.weights(self.node, &self.oracle.shading_point().lanes(self.lobe), self.oracle)
     }
 }
 
 impl<const N: usize> WideTree<'_, N> {
     /// Returns the weight of every child of a node.
     pub(in crate::tlas) fn weigh(&self, node: usize, oracle: &impl LeafOracle) -> [f32; N] {
-        InstructionSet::best().run(NodeWeights { tlas: self, node, oracle })
+        let receiver = oracle.shading_point().receiver;
+        for_lobe!(receiver, lobe => InstructionSet::best().run(NodeWeights { tlas: self, node, oracle, lobe }))
     }
 
     /// Draws a leaf. Returns it with its probability; `None` where nothing can arrive from the part of the tree
@@ -190,11 +193,13 @@ impl<const N: usize> WideTree<'_, N> {
         u: Variate,
     ) -> Option<(u32, f64)> {
         let Some(root) = self.nodes.first() else { return self.single_leaf(oracle).then_some((0, 1.0)) };
-        let mut walk = Descent::new(oracle, u);
-        if let Some(weights) = first {
-            walk.choose(root, &weights.lanes());
-        }
-        InstructionSet::best().run(SampleWalk { tlas: self, walk })
+        for_lobe!(oracle.shading_point().receiver, lobe => {
+            let mut walk = Descent::new(oracle, lobe, u);
+            if let Some(weights) = first {
+                walk.choose(root, &weights.lanes());
+            }
+            InstructionSet::best().run(SampleWalk { tlas: self, walk })
+        })
     }
 
     /// Draws a leaf below a node.
@@ -204,12 +209,14 @@ impl<const N: usize> WideTree<'_, N> {
         oracle: &impl LeafOracle,
         u: Variate,
     ) -> Option<(u32, f64)> {
-        let walk = Descent { node: node as u32, ..Descent::new(oracle, u) };
-        InstructionSet::best().run(SampleWalk { tlas: self, walk })
+        for_lobe!(oracle.shading_point().receiver, lobe => {
+            let walk = Descent { node: node as u32, ..Descent::new(oracle, lobe, u) };
+            InstructionSet::best().run(SampleWalk { tlas: self, walk })
+        })
     }
 
     /// Draws a leaf for each walk, which then holds it.
-    pub(crate) fn sample_many(&self, walks: &mut [Descent<impl LeafOracle>]) {
+    pub(crate) fn sample_many(&self, walks: &mut [Descent<impl LeafOracle, impl Lobe>]) {
         if self.nodes.is_empty() {
             for walk in walks {
                 walk.end = Some(self.single_leaf(&walk.oracle).then_some(0));
@@ -224,7 +231,8 @@ impl<const N: usize> WideTree<'_, N> {
         if self.nodes.is_empty() {
             return if self.single_leaf(oracle) { 1.0 } else { 0.0 };
         }
-        InstructionSet::best().run(PmfWalk { tlas: self, leaf, oracle, first })
+        let receiver = oracle.shading_point().receiver;
+        for_lobe!(receiver, lobe => InstructionSet::best().run(PmfWalk { tlas: self, leaf, oracle, lobe, first }))
     }
 
     /// Returns the weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all

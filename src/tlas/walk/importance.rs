@@ -5,13 +5,17 @@
 //! A cluster's position and normal are taken for normal variables with its mean and variance; cosines become the
 //! expectation of a clamped normal variable.
 //!
-//! Moments say little of what is near the shading point. A cluster there is opened, which means that the sum of its own
-//! children's weights is its weight. A light there is weighed by its exact irradiance.
+//! The lobe of a receiver is weighed in the direction to a cluster's mean, widened by the variance of the positions
+//! ([`Lobe`]).
+//!
+//! Moments say little of what is near the shading point, and one direction says little of a cluster over which a lobe varies.
+//! Such a cluster is opened, which means that the sum of its own children's weights is its weight. A light near the point is
+//! weighed by its exact irradiance.
 
 use glam::Vec3;
 
 use crate::math::{self, at_least, only_if};
-use crate::receiver::{LEAST_CLUSTER_COSINE, ReceiverLanes, ShadingPoint};
+use crate::receiver::{LEAST_CLUSTER_COSINE, Lobe, ReceiverLanes, ShadingPoint};
 use crate::tlas::node::{ALL, Child, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
 use crate::tlas::tree::WideTree;
 use crate::warp::{keep_least, within_range};
@@ -76,6 +80,10 @@ const EDGE_COSINE: f32 = 3e-3;
 ///
 /// Larger: the moments of clusters around the point are trusted. Smaller: more children are opened, which costs time.
 const OPENING: f32 = 0.7;
+/// Variation of a lobe over a cluster from which on the cluster is opened. *Measured* on clouds (docs/ACCURACY.md, "Lobes").
+///
+/// Larger: lights off the peak are mistaken for those in it. Smaller: more clusters are opened, which costs time.
+const MIXED_LOBE: f32 = 0.8;
 /// Least weight of a leaf near the shading point, relative to that by its moments. It stands in for what rounding takes from
 /// the exact irradiance. *Chosen*: below a thousandth of the largest weight, `f32` still has the irradiance to 1e-3.
 ///
@@ -92,6 +100,10 @@ pub(super) const NORMAL_VARIANCE_SHARE: f32 = 0.4;
 const EMITTER_VARIANCE_SHARE: f32 = 1.0 / 3.0;
 /// Share of the positions' variance, for the cosine at the receiver.
 const RECEIVER_VARIANCE_SHARE: f32 = 0.8;
+/// Share of the positions' variance, for the directions that a lobe is widened by. Measured: docs/ACCURACY.md, "Lobes".
+///
+/// Larger: the choice follows the lobe less. Smaller: clusters off the peak starve though some of their lights are in it.
+const DIRECTION_VARIANCE_SHARE: f32 = 0.5;
 /// Share of the positions' variance, for the squared distance.
 const DISTANCE_VARIANCE_SHARE: f32 = 0.3;
 
@@ -104,17 +116,17 @@ pub(super) struct Estimates<const N: usize> {
     /// Two sets of bits: leaves of which the bounds do not decide whether they are visible, and leaves near the shading
     /// point.
     pub(super) doubtful: [u32; 2],
-    /// A set of bits: nodes near the shading point that may send something.
+    /// A set of bits: nodes near the shading point, or over which the lobe varies, that may send something.
     pub(super) opened: u32,
 }
 
 impl<const N: usize> WideTree<'_, N> {
     /// Returns the weight of every child of a node. All zero where nothing below the node can be visible.
     ///
-    /// A child that is a node itself and near the shading point is opened: the sum of its own children's weights is its
+    /// A child that is a node itself, and near the shading point or mixed for the lobe, is opened: the sum of its own children's weights is its
     /// weight. That is one level, and depends on the shading point alone.
     #[inline(always)]
-    pub(super) fn weights(&self, index: usize, x: &ReceiverLanes, oracle: &impl LeafOracle) -> [f32; N] {
+    pub(super) fn weights(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> [f32; N] {
         let node = &self.nodes[index];
         let Estimates { mut weights, mut largest, mut opened, .. } = node.asked(x, oracle);
         if opened != 0 {
@@ -132,7 +144,7 @@ impl<const N: usize> WideTree<'_, N> {
 
     /// Returns the sum of the weights of a node's children.
     #[inline(always)]
-    fn opened(&self, index: usize, x: &ReceiverLanes, oracle: &impl LeafOracle) -> f32 {
+    fn opened(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> f32 {
         let sum: f32 = self.nodes[index].asked(x, oracle).weights.iter().sum();
         only_if(sum > 0.0, within_range(sum))
     }
@@ -141,7 +153,7 @@ impl<const N: usize> WideTree<'_, N> {
 impl<const N: usize> Node<N> {
     /// Estimates all lanes, and asks the oracle about what is in doubt and what portals show.
     #[inline(always)]
-    fn asked(&self, x: &ReceiverLanes, oracle: &impl LeafOracle) -> Estimates<N> {
+    fn asked(&self, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> Estimates<N> {
         let mut estimates = self.estimates(x);
         if oracle.has_shaped_leaves() {
             // By value: what is referred to is kept in memory.
@@ -177,7 +189,7 @@ impl<const N: usize> Node<N> {
 
     /// Multiplies what comes through portals by what is seen there, and returns the bits of the largest weight.
     #[inline(always)]
-    fn look_through(&self, x: &ReceiverLanes, oracle: &impl LeafOracle, weights: &mut [f32; N]) -> u32 {
+    fn look_through(&self, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle, weights: &mut [f32; N]) -> u32 {
         let (portals, centers, halves) = (self.portals, self.centers, self.halves);
         let origin = Vec3::from_array(self.origin) - x.position;
         let step = Vec3::from_array(self.steps.map(wide));
@@ -205,7 +217,7 @@ impl<const N: usize> Node<N> {
 
     /// Estimates all lanes, in one plain loop over arrays that a compiler can turn into vectors.
     #[inline(always)]
-    fn estimates(&self, x: &ReceiverLanes) -> Estimates<N> {
+    fn estimates(&self, x: &ReceiverLanes<impl Lobe>) -> Estimates<N> {
         let (normals, energies, centers, halves) = (self.normals, self.energies, self.centers, self.halves);
         let (means, deviations, lengths, tangents) = (self.means, self.deviations, self.lengths, self.tangents);
         // Relative to the shading point before anything else: far from the origin the difference is what is exact.
@@ -215,7 +227,7 @@ impl<const N: usize> Node<N> {
         let mean_step = half_step * (1.0 / MEAN_STEPS);
         let (horizon, absolute_horizon, normal) = (x.horizon, x.horizon.abs(), x.normal);
         let mut weights = [0.0; N];
-        let (mut largest, mut doubtful, mut near) = (0, 0, 0);
+        let (mut largest, mut doubtful, mut near, mut mixed) = (0, 0, 0, 0);
         for i in 0..N {
             let counts = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
             let half = counts * half_step;
@@ -258,6 +270,10 @@ impl<const N: usize> Node<N> {
             let loss = NORMAL_VARIANCE_SHARE - length * length * (NORMAL_VARIANCE_SHARE / (255.0 * 255.0));
             let spread = loss * squared + EMITTER_VARIANCE_SHARE * variance;
             let emitter = at_least(clamped_mean(facing, spread), LEAST_CLUSTER_COSINE * distance);
+            let spread2 = DIRECTION_VARIANCE_SHARE * variance * inverse2;
+            let receiver = x.lobe.weigh(receiver, to_mean.to_array(), distance, spread2);
+            let direction = (to_mean * (distance * inverse2)).to_array();
+            let is_mixed = x.lobe.variation(direction, spread2) > MIXED_LOBE;
             let term = (receiver * inverse2) * emitter * inverse2;
 
             weights[i] = only_if(!culled, within_range(energy * term));
@@ -265,9 +281,10 @@ impl<const N: usize> Node<N> {
             let averted = facing < EDGE_COSINE * distance;
             doubtful |= u32::from((straddles | averted) & !culled) << i;
             near |= u32::from((radius2 > OPENING * OPENING * distance2) & !culled) << i;
+            mixed |= u32::from(is_mixed & !culled) << i;
         }
         let leaves = self.children() & (u32::MAX << self.node_count);
-        Estimates { weights, largest, doubtful: [doubtful & leaves, near & leaves], opened: near & !leaves }
+        Estimates { weights, largest, doubtful: [doubtful & leaves, near & leaves], opened: (near | mixed) & !leaves }
     }
 }
 

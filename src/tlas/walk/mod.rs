@@ -17,6 +17,7 @@ pub(crate) use descend::{Descent, FirstWeights, INTERLEAVED};
 pub(crate) use importance::LeafOracle;
 pub use split::Splitting;
 
+use crate::receiver::Lobe;
 use crate::tlas::arity::Arity;
 use crate::tlas::tree::{TlasView, for_arity};
 use crate::warp::Variate;
@@ -35,7 +36,7 @@ impl TlasView<'_> {
     }
 
     /// Draws a leaf for each descent, as [`Self::sample`] does without `first`. Each descent then holds what was drawn.
-    pub(crate) fn sample_many(&self, descents: &mut [Descent<impl LeafOracle>]) {
+    pub(crate) fn sample_many(&self, descents: &mut [Descent<impl LeafOracle, impl Lobe>]) {
         for_arity!(self, tree => tree.sample_many(descents));
     }
 

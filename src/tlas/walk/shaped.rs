@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::importance::Estimates;
 use crate::math;
-use crate::receiver::ReceiverLanes;
+use crate::receiver::{Lobe, ReceiverLanes};
 use crate::simd::{InstructionSet, Kernel};
 use crate::tlas::node::{Child, Node, WIDE, wide};
 
@@ -20,7 +20,7 @@ impl<const N: usize> Node<N> {
     /// Returns the estimates, corrected for the children marked with
     /// [`LANE_SHAPED`](crate::tlas::node::LANE_SHAPED).
     #[inline(never)]
-    pub(super) fn shaped(&self, x: &ReceiverLanes, mut estimates: Estimates<N>) -> Estimates<N> {
+    pub(super) fn shaped(&self, x: &ReceiverLanes<impl Lobe>, mut estimates: Estimates<N>) -> Estimates<N> {
         let [shaped, everywhere, above] = InstructionSet::best().run(LaneSets { node: self, x });
         // No side is averted of what sends everywhere: what is left of the doubt is the horizon.
         estimates.doubtful[0] &= !(shaped & everywhere & above);
@@ -38,7 +38,7 @@ impl<const N: usize> Node<N> {
     }
 
     /// Corrects the estimates of a child that sends into a narrow cone.
-    fn focus(&self, lane: usize, x: &ReceiverLanes, estimates: &mut Estimates<N>) {
+    fn focus(&self, lane: usize, x: &ReceiverLanes<impl Lobe>, estimates: &mut Estimates<N>) {
         let bit = 1 << lane;
         let step = Vec3::from_array(self.steps.map(wide));
         let (centers, halves) = (self.centers, self.halves);
@@ -62,12 +62,12 @@ impl<const N: usize> Node<N> {
 
 /// Finds three sets of bits: children that are marked, children some of which send everywhere, and children above the horizon
 /// for certain.
-struct LaneSets<'a, const N: usize> {
+struct LaneSets<'a, const N: usize, L> {
     node: &'a Node<N>,
-    x: &'a ReceiverLanes,
+    x: &'a ReceiverLanes<L>,
 }
 
-impl<const N: usize> Kernel for LaneSets<'_, N> {
+impl<const N: usize, L: Lobe> Kernel for LaneSets<'_, N, L> {
     type Output = [u32; 3];
 
     #[inline(always)]

@@ -3,7 +3,9 @@
 pub(crate) mod build;
 pub(crate) mod reader;
 
-use fanlight::{LightSample, LightSampler, LightSamplerView, Receiver, SampledLight, ShadingPoint, Splitting};
+use fanlight::{
+    Glossy, LightSample, LightSampler, LightSamplerView, Receiver, SampledLight, Scattering, ShadingPoint, Splitting,
+};
 use glam::Vec3;
 use reader::Reader;
 use smallvec::SmallVec;
@@ -57,7 +59,16 @@ pub(crate) fn bytes(data: &[u8]) {
 fn receiver(reader: &mut Reader<'_>) -> Receiver {
     let any = reader.vector();
     let normal = if reader.byte() < 250 { any.normalize_or(Vec3::Z) } else { any };
-    [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][reader.below(3)]
+    match reader.below(5) {
+        0 => Receiver::Surface(normal),
+        1 => Receiver::Transmissive(normal),
+        2 => Receiver::Volume,
+        3 => {
+            let surface = Glossy::new(normal, reader.vector(), reader.float());
+            Receiver::Glossy(surface.with_weights(reader.float(), reader.float()))
+        }
+        _ => Receiver::Scattering(Scattering::new(reader.vector(), reader.float())),
+    }
 }
 
 /// Draws from one point, and checks every density.
@@ -108,6 +119,7 @@ fn is_ordinary(x: &ShadingPoint) -> bool {
     x.position.abs().max_element() <= POSITION_LIMIT
         && match x.receiver {
             Receiver::Surface(normal) | Receiver::Transmissive(normal) => (normal.length() - 1.0).abs() < 1e-5,
+            Receiver::Glossy(surface) => (surface.normal().length() - 1.0).abs() < 1e-5,
             _ => true,
         }
 }

@@ -4,7 +4,7 @@ use fanlight::ShadingPoint;
 use glam::Vec3;
 
 use super::pcg::Pcg32;
-use super::scene::{Content, Scene, random_point};
+use super::scene::{Content, Scene, random_point, with_lobe};
 
 /// Scenes by their number modulo 8 that are squeezed to slivers, moved a thousand units away, or shrunk.
 pub(crate) const MOVED: [usize; 3] = [FLAT, FAR, SMALL];
@@ -57,4 +57,10 @@ pub(crate) fn shading_point(number: usize, scene: &Scene, pcg: &mut Pcg32) -> Sh
         _ => x.position += a - Vec3::splat(0.5),
     }
     x
+}
+
+/// The same points with lobes, down to mirrors.
+pub(crate) fn shading_point_with_lobe(number: usize, scene: &Scene, pcg: &mut Pcg32) -> ShadingPoint {
+    let x = shading_point(number, scene, pcg);
+    with_lobe(x, pcg, 1e-4)
 }

@@ -1,6 +1,6 @@
 //! Irradiance in double precision, from a scene's description alone.
 
-use fanlight::{Filter, Receiver, ShadingPoint, Wrap};
+use fanlight::{Filter, Glossy, Receiver, ShadingPoint, Wrap};
 use glam::{DVec2, DVec3};
 
 use super::scene::{Image, LightMesh, Paint, Scene, Sky};
@@ -8,14 +8,37 @@ use super::scene::{Image, LightMesh, Paint, Scene, Sky};
 /// The generalised golden ratio in two dimensions: multiples of its inverse powers fill the square evenly.
 const GOLDEN: f64 = 1.324_717_957_244_746;
 
-/// Cosine weight of a unit direction.
+/// Weight of a unit direction: the cosine, and what a lobe makes of it.
 pub(crate) fn cosine(receiver: &Receiver, direction: DVec3) -> f64 {
     match *receiver {
         Receiver::Surface(normal) => normal.as_dvec3().dot(direction).max(0.0),
         Receiver::Transmissive(normal) => normal.as_dvec3().dot(direction).abs(),
         Receiver::Volume => 1.0,
+        Receiver::Glossy(surface) => glossy(&surface, direction),
+        Receiver::Scattering(medium) => {
+            let (g, cosine) = (f64::from(medium.asymmetry()), medium.outgoing().as_dvec3().dot(direction));
+            (1.0 - g * g) / (1.0 + g * g + 2.0 * g * cosine).powf(1.5)
+        }
         _ => panic!("the oracle does not know this receiver"),
     }
+}
+
+/// `π f cos θ` of a diffuse base and a GGX lobe, as Walter et al. 2007 and Heitz 2014 have it, by Smith's Λ.
+fn glossy(surface: &Glossy, direction: DVec3) -> f64 {
+    let (n, o) = (surface.normal().as_dvec3(), surface.outgoing().as_dvec3());
+    let (cos_i, cos_o) = (n.dot(direction), n.dot(o));
+    if cos_i <= 0.0 {
+        return 0.0;
+    }
+    let alpha2 = f64::from(surface.roughness()).powi(2);
+    let [kd, ks] = surface.weights().map(f64::from);
+    let h = direction + o;
+    let (sin2, cos2) = (n.cross(h).length_squared() / h.length_squared(), n.dot(h).powi(2) / h.length_squared());
+    // π D, where D cos² is the density of slopes.
+    let distribution = alpha2 / (cos2 * alpha2 + sin2).powi(2);
+    let lambda = |cos: f64| 0.5 * ((1.0 + alpha2 * (1.0 - cos * cos).max(0.0) / (cos * cos)).sqrt() - 1.0);
+    let masking = 1.0 / (1.0 + lambda(cos_i) + lambda(cos_o));
+    kd * cos_i + ks * distribution * masking / (4.0 * cos_o)
 }
 
 fn wrapped(wrap: Wrap, index: i64, n: usize) -> usize {
@@ -171,7 +194,12 @@ fn cut(
 ) {
     let [a, b, c] = vertices;
     let mut above = 3;
-    if let Receiver::Surface(normal) = *receiver {
+    let normal = match *receiver {
+        Receiver::Surface(normal) => Some(normal),
+        Receiver::Glossy(surface) => Some(surface.normal()),
+        _ => None,
+    };
+    if let Some(normal) = normal {
         above = vertices.iter().filter(|v| normal.as_dvec3().dot(**v) > 0.0).count();
     }
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());

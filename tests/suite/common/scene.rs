@@ -1,8 +1,8 @@
 //! Scenes as plain descriptions, from which a sampler is built and an oracle computes.
 
 use fanlight::{
-    Arity, Environment, Filter, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver, ShadingPoint, Sides,
-    Texture, Weight, Wrap,
+    Arity, Environment, Filter, Glossy, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver, Scattering,
+    ShadingPoint, Sides, Texture, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -255,4 +255,23 @@ pub(crate) fn random_point(pcg: &mut Pcg32, kind: usize) -> ShadingPoint {
     let normal = pcg.direction();
     let receiver = [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][kind % 3];
     ShadingPoint::new(position, receiver)
+}
+
+/// The same point with a lobe: a glossy surface in place of a surface, of a roughness between `least` and 1, and a phase
+/// function in a volume.
+pub(crate) fn with_lobe(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> ShadingPoint {
+    let (any, kind, roughness) = (pcg.direction(), pcg.below(8), least.powf(pcg.f32()));
+    let (Receiver::Surface(normal) | Receiver::Transmissive(normal)) = x.receiver else {
+        return ShadingPoint::scattering(x.position, Scattering::new(any, pcg.within(-0.95, 0.95)));
+    };
+    let above = if any.dot(normal) < 0.0 { -any } else { any };
+    let outgoing = match kind {
+        // Grazing, below the horizon, and straight above.
+        0 => above - (1.0 - 1e-4) * normal * above.dot(normal),
+        1 => -above,
+        2 => normal,
+        _ => above,
+    };
+    let diffuse = if kind % 2 == 0 { 0.0 } else { pcg.f32() };
+    ShadingPoint::glossy(x.position, Glossy::new(normal, outgoing, roughness).with_weights(diffuse, 1.0))
 }

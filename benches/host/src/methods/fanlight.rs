@@ -4,14 +4,14 @@
 //! that point alone; a sample on a portal stands for the sky along the direction, through whatever portals the ray crosses.
 
 use fanlight::{
-    Environment, Filter, Hit, LightSampler, Mesh, MeshId, PointSampler, SampledLight, ShadingPoint, Texture,
+    Environment, Filter, Glossy, Hit, LightSampler, Mesh, MeshId, PointSampler, SampledLight, ShadingPoint, Texture,
     TriangleId, Weight, Wrap,
 };
 use glam::Vec3;
 
 use super::{Lighting, LightsHere, Proposal, Target};
 use crate::Error;
-use crate::bsdf::Vertex;
+use crate::bsdf::{Material, Vertex};
 use crate::random::Pcg32;
 use crate::scene::Radiance;
 use crate::world::{EmitterPoint, World};
@@ -25,6 +25,8 @@ pub(super) struct Fanlight {
     starts: Vec<u32>,
     /// Whether the sky is a light itself, as no portal leads to it.
     open_sky: bool,
+    /// Whether glossy surfaces are handed over as such.
+    tells_lobes: bool,
 }
 
 impl Fanlight {
@@ -61,7 +63,12 @@ impl Fanlight {
             *next += emitter.mesh.indices.len() as u32;
             Some(first)
         });
-        Ok(Self { lights: builder.build()?, ids: ids.collect(), starts: starts.collect(), open_sky })
+        Ok(Self { lights: builder.build()?, ids: ids.collect(), starts: starts.collect(), open_sky, tells_lobes: true })
+    }
+
+    /// Returns the same without lobes: all surfaces are taken for diffuse ones.
+    pub(super) fn blind(self) -> Self {
+        Self { tells_lobes: false, ..self }
     }
 }
 
@@ -76,7 +83,12 @@ impl Lighting for Fanlight {
 
     #[inline]
     fn at(&self, vertex: &Vertex) -> Here<'_> {
-        let point = ShadingPoint::surface(vertex.position, vertex.normal);
+        let point = match vertex.material {
+            Material::Glossy { alpha, .. } if self.tells_lobes => {
+                ShadingPoint::glossy(vertex.position, Glossy::new(vertex.normal, vertex.outgoing, alpha))
+            }
+            _ => ShadingPoint::surface(vertex.position, vertex.normal),
+        };
         Here { fanlight: self, lights: self.lights.at(&point) }
     }
 }

@@ -11,7 +11,7 @@ mod spherical_rectangle;
 use glam::Vec3;
 
 use crate::Error;
-use crate::bsdf::Vertex;
+use crate::bsdf::{Material, Vertex};
 use crate::film::Film;
 use crate::integrator::render_pass;
 use crate::random::Pcg32;
@@ -84,10 +84,16 @@ macro_rules! with {
 }
 
 impl Method {
-    /// Returns the methods that a scene is rendered with: what hosts have, and at last fanlight.
+    /// Returns the methods that a scene is rendered with: what hosts have, and at last fanlight; where there are glossy
+    /// surfaces, once without their lobes.
     pub(crate) fn all(world: &World) -> Result<Vec<Self>, Error> {
         let mut methods = Self::competitors(world);
-        methods.push(Self { name: "fanlight", lighting: AnyLighting::Fanlight(Box::new(Fanlight::new(world)?)) });
+        let ours = |name, fanlight| Self { name, lighting: AnyLighting::Fanlight(Box::new(fanlight)) };
+        methods.push(ours("fanlight", Fanlight::new(world)?));
+        let is_glossy = |(_, material): &(_, Material)| matches!(material, Material::Glossy { .. });
+        if world.scene.solids.iter().any(is_glossy) {
+            methods.push(ours("fanlight@blind", Fanlight::new(world)?.blind()));
+        }
         Ok(methods)
     }
 
