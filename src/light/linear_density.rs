@@ -22,8 +22,8 @@ const LINEAR_GEOMETRY: f32 = 1.0 / 8.0;
 /// Least ratio of the weights of two corners.
 ///
 /// Chosen, not swept. Larger: more triangles at the horizon, where the cosine varies, are divided into cells. Smaller: points
-/// far from linear, and a map from the square that is less even.
-const LEAST_CORNER_RATIO: f32 = 1.0 / 16.0;
+/// far from linear, and more steps of the map from the square.
+const LEAST_CORNER_RATIO: f32 = 1.0 / 8.0;
 
 /// A density that is linear over the area of a triangle.
 pub(super) struct LinearDensity {

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use glam::Vec3;
 
 use super::node::Child;
-use super::tree::WideTree;
+use super::tree::{WideTree, for_arity};
 use super::walk::descend::{Descent, PmfWalk, SampleWalk};
 use super::walk::ray::{Crossed, Met};
 use super::{Arity, LeafOracle, Splitting, Tlas, TlasView};
@@ -127,7 +127,8 @@ fn probabilities_sum_to_one<const N: usize>(before: impl Fn(&ShadingPoint) -> Be
             let x = shading_point(i, &mut pcg);
             let oracle = &before(&x);
             let leaves: f64 = (0..n as u32).map(|leaf| view.pmf(leaf, oracle, None)).sum();
-            let dead = dead_mass(&view.wide::<N>(), 0, oracle);
+            // Few lights are in narrower nodes.
+            let dead = for_arity!(view, tree => dead_mass(&tree, 0, oracle));
             assert!((leaves + dead - 1.0).abs() < 1e-9, "{n} lights: {leaves} + {dead}");
         }
     }
