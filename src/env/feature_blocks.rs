@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use core::cmp::Ordering;
 
 use super::feature_texel::FeatureTexel;
-use super::features::Cluster;
+use super::features::TexelCluster;
 
 /// Relative variance within the blocks of a feature up to which they stay as they are. Chosen on captured suns, not swept.
 ///
@@ -58,7 +58,7 @@ impl Ord for Block {
 /// much, or hold what does not belong to the cluster: `is_foreign` tells of a range of codes.
 pub(super) fn blocks(
     depth: u32,
-    cluster: &Cluster,
+    cluster: &TexelCluster,
     most: usize,
     is_foreign: impl Fn(u64, u64) -> bool,
 ) -> Vec<FeatureTexel> {

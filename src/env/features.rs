@@ -72,7 +72,7 @@ type BrightTexel = (u32, f32);
 
 /// Bright texels that are connected, sorted by code.
 #[derive(Clone, Debug)]
-pub(super) struct Cluster {
+pub(super) struct TexelCluster {
     pub(super) texels: Vec<BrightTexel>,
     /// Radiance above which the texels belong to the feature.
     pub(super) cap: f32,
@@ -120,8 +120,9 @@ impl BrightFeatures {
         bright.sort_unstable_by_key(|&(code, _)| code);
         let mut clusters = clusters(depth, bright.clone(), cap, limits.sin_radius);
         // The strongest remain; of equal ones the first.
-        let excess =
-            |cluster: &Cluster| cluster.texels.iter().map(|&(_, v)| f64::from(v) - f64::from(cluster.cap)).sum::<f64>();
+        let excess = |cluster: &TexelCluster| {
+            cluster.texels.iter().map(|&(_, v)| f64::from(v) - f64::from(cluster.cap)).sum::<f64>()
+        };
         clusters.sort_by(|a, b| excess(b).total_cmp(&excess(a)));
         let mut room = most;
         clusters.retain(|cluster| {
@@ -137,7 +138,7 @@ impl BrightFeatures {
         Self::from_clusters(depth, &bright, &clusters, limits)
     }
 
-    fn from_clusters(depth: u32, bright: &[BrightTexel], clusters: &[Cluster], limits: &FeatureLimits) -> Self {
+    fn from_clusters(depth: u32, bright: &[BrightTexel], clusters: &[TexelCluster], limits: &FeatureLimits) -> Self {
         let mut owners = vec![NO_CLUSTER; bright.len()];
         for (i, cluster) in (0..).zip(clusters) {
             for &(code, _) in &cluster.texels {
@@ -176,13 +177,13 @@ impl BrightFeatures {
 
 /// Groups neighboring bright texels. The cap of a group that is too large is doubled, again and again, and the group
 /// falls apart.
-fn clusters(depth: u32, bright: Vec<BrightTexel>, cap: f32, sin_radius: f32) -> Vec<Cluster> {
+fn clusters(depth: u32, bright: Vec<BrightTexel>, cap: f32, sin_radius: f32) -> Vec<TexelCluster> {
     let mut found = Vec::new();
     let mut open = vec![(bright, cap, 0)];
     while let Some((bright, cap, doublings)) = open.pop() {
         for texels in connected(depth, &bright) {
             if radius(depth, &texels) <= sin_radius {
-                found.push(Cluster { texels, cap });
+                found.push(TexelCluster { texels, cap });
             } else if doublings < MAX_DOUBLINGS {
                 let brighter: Vec<_> = texels.into_iter().filter(|&(_, v)| v > 2.0 * cap).collect();
                 open.push((brighter, 2.0 * cap, doublings + 1));

@@ -209,9 +209,14 @@ pub(crate) trait ReceiverKind: Copy {
 
     /// Writes the mean weights of many cones ([`mean_over_cone`](Self::mean_over_cone)), with axes by component.
     #[inline(always)]
-    fn means_over_cones<const N: usize>(self, axes: &[[f32; N]; 3], sin_radii: &[f32; N], means: &mut [f32; N]) {
+    fn means_over_cones<const LANES: usize>(
+        self,
+        axes: &[[f32; LANES]; 3],
+        sin_radii: &[f32; LANES],
+        means: &mut [f32; LANES],
+    ) {
         let [x, y, z] = axes;
-        for i in 0..N {
+        for i in 0..LANES {
             means[i] = self.mean_over_cone(Vec3::new(x[i], y[i], z[i]), sin_radii[i]);
         }
     }
@@ -283,7 +288,12 @@ impl ReceiverKind for Receiver {
     }
 
     #[inline(always)]
-    fn means_over_cones<const N: usize>(self, axes: &[[f32; N]; 3], sin_radii: &[f32; N], means: &mut [f32; N]) {
+    fn means_over_cones<const LANES: usize>(
+        self,
+        axes: &[[f32; LANES]; 3],
+        sin_radii: &[f32; LANES],
+        means: &mut [f32; LANES],
+    ) {
         dispatch!(self, kind => kind.means_over_cones(axes, sin_radii, means));
     }
 

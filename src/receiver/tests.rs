@@ -6,10 +6,10 @@ use super::*;
 use crate::testing::Pcg32;
 
 /// Outgoing direction, roughness and weights of a lobe.
-type Parameters = ([f64; 3], f64, [f64; 2]);
+type LobeParameters = ([f64; 3], f64, [f64; 2]);
 
 /// `π f cos θ` of a coated surface with the normal z, from the books: Walter et al. 2007 and Heitz 2014, by Smith's Λ.
-fn reflected((outgoing, alpha, [kd, ks]): Parameters, direction: DVec3) -> f64 {
+fn reflected((outgoing, alpha, [kd, ks]): LobeParameters, direction: DVec3) -> f64 {
     let outgoing = DVec3::from_array(outgoing);
     let (cos_i, cos_o) = (direction.z, outgoing.z);
     if cos_i <= 0.0 {
@@ -24,11 +24,11 @@ fn reflected((outgoing, alpha, [kd, ks]): Parameters, direction: DVec3) -> f64 {
     (kd * cos_i + ks * PI * d * g / (4.0 * cos_o)) / total
 }
 
-fn coated((outgoing, alpha, [kd, ks]): Parameters) -> Glossy {
+fn coated((outgoing, alpha, [kd, ks]): LobeParameters) -> Glossy {
     Glossy::new(Vec3::Z, DVec3::from_array(outgoing).as_vec3(), alpha as f32).with_weights(kd as f32, ks as f32)
 }
 
-const LOBES: [Parameters; 5] = [
+const LOBES: [LobeParameters; 5] = [
     ([0.6, 0.0, 0.8], 0.5, [0.0, 1.0]),
     ([0.0, 0.0, 1.0], 0.1, [0.5, 0.5]),
     ([-0.6, 0.64, 0.48], 0.05, [0.2, 0.8]),

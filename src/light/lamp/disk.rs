@@ -5,8 +5,8 @@ use core::f32::consts::PI;
 use glam::{DVec3, Vec3};
 
 use super::{
-    Fault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_axis, check_length, check_position, check_weight,
-    irradiance_of_directions,
+    LampFault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_axis, check_length, check_position,
+    check_weight, irradiance_of_directions,
 };
 use crate::geometry::{Aabb, Cone};
 use crate::light::Sides;
@@ -71,7 +71,7 @@ impl LampKind for DiskLight {
         Self { center, normal, radius, radiance, two_sided: two_sided > 0.0 }
     }
 
-    fn check(&self) -> Result<(), Fault> {
+    fn check(&self) -> Result<(), LampFault> {
         check_axis("length of the normal", self.normal)?;
         check_length("radius", self.radius)?;
         check_position("center", self.center, self.radius)?;

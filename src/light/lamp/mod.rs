@@ -99,7 +99,7 @@ const _: () = assert!(
 
 /// A number that a lamp must not have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Fault {
+struct LampFault {
     what: &'static str,
     value: f32,
     expected: &'static str,
@@ -131,7 +131,7 @@ trait LampKind: Sized {
     fn from_values(values: [f32; VALUES]) -> Self;
 
     /// Checks the numbers, which may come from outside.
-    fn check(&self) -> Result<(), Fault>;
+    fn check(&self) -> Result<(), LampFault>;
 
     /// Whether the lamp has an extent.
     fn has_extent(&self) -> bool;
@@ -238,7 +238,7 @@ impl Lamp {
     /// If a number is not finite or out of its range.
     pub(crate) fn record(self, number: u32) -> Result<LampRecord, Error> {
         let (kind, values) = of_lamp!(self, kind => {
-            kind.check().map_err(|Fault { what, value, expected }| {
+            kind.check().map_err(|LampFault { what, value, expected }| {
                 Error(ErrorKind::Lamp { light: number as usize, what, value, expected })
             })?;
             (code_of(&kind), kind.to_values())
@@ -438,27 +438,27 @@ fn irradiance_of_directions(receiver: Receiver, axis: DVec3, sin_reach: f64, sol
 }
 
 /// `Ok` if a vector has the length 1, which it has unless it had no direction.
-fn check_axis(what: &'static str, axis: Vec3) -> Result<(), Fault> {
+fn check_axis(what: &'static str, axis: Vec3) -> Result<(), LampFault> {
     within(what, axis.length(), [0.999, 1.001], "positive and finite")
 }
 
 /// `Ok` if a number is in a range.
-fn within(what: &'static str, value: f32, [low, high]: [f32; 2], expected: &'static str) -> Result<(), Fault> {
-    if (low..=high).contains(&value) { Ok(()) } else { Err(Fault { what, value, expected }) }
+fn within(what: &'static str, value: f32, [low, high]: [f32; 2], expected: &'static str) -> Result<(), LampFault> {
+    if (low..=high).contains(&value) { Ok(()) } else { Err(LampFault { what, value, expected }) }
 }
 
 /// `Ok` if a radiance or an intensity is finite and not negative.
-fn check_weight(what: &'static str, value: f32) -> Result<(), Fault> {
+fn check_weight(what: &'static str, value: f32) -> Result<(), LampFault> {
     within(what, value, [0.0, blas::MAX_AVERAGE], "from 0 to 1e30")
 }
 
 /// `Ok` if a radius or another length is positive and not too large.
-fn check_length(what: &'static str, value: f32) -> Result<(), Fault> {
+fn check_length(what: &'static str, value: f32) -> Result<(), LampFault> {
     within(what, value, [LEAST_LENGTH, POSITION_LIMIT], "from 1e-15 to 1e9")
 }
 
 /// `Ok` if a position is finite, and nothing in this distance of it is too far away.
-fn check_position(what: &'static str, position: Vec3, size: f32) -> Result<(), Fault> {
+fn check_position(what: &'static str, position: Vec3, size: f32) -> Result<(), LampFault> {
     let limit = [-POSITION_LIMIT, POSITION_LIMIT];
     let farthest = |value: f32| if value < 0.0 { value - size } else { value + size };
     let check = |value: f32| within(what, farthest(value), limit, "from -1e9 to 1e9, with the extent of the light");

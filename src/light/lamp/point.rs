@@ -4,7 +4,7 @@ use core::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::{Fault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_position, check_weight};
+use super::{LampFault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_position, check_weight};
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
 use crate::math;
@@ -52,7 +52,7 @@ impl LampKind for PointLight {
         Self { position: Vec3::new(x, y, z), intensity }
     }
 
-    fn check(&self) -> Result<(), Fault> {
+    fn check(&self) -> Result<(), LampFault> {
         check_position("position", self.position, 0.0)?;
         check_weight("intensity", self.intensity)
     }

@@ -5,7 +5,7 @@ use core::f32::consts::PI;
 use glam::{DVec3, Vec3};
 
 use super::{
-    Fault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_length, check_position, check_weight,
+    LampFault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_length, check_position, check_weight,
     irradiance_of_cap,
 };
 use crate::geometry::{Aabb, Cone};
@@ -66,7 +66,7 @@ impl LampKind for SphereLight {
         Self { center: Vec3::new(x, y, z), radius, radiance, two_sided: two_sided > 0.0 }
     }
 
-    fn check(&self) -> Result<(), Fault> {
+    fn check(&self) -> Result<(), LampFault> {
         check_length("radius", self.radius)?;
         check_position("center", self.center, self.radius)?;
         check_weight("radiance", self.radiance)

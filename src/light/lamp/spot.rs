@@ -5,7 +5,7 @@ use core::f32::consts::FRAC_PI_2;
 use glam::{DVec3, Vec3};
 
 use super::point::PointView;
-use super::{Fault, LampKind, Reach, ShapeView, VALUES, check_axis, check_position, check_weight, within};
+use super::{LampFault, LampKind, Reach, ShapeView, VALUES, check_axis, check_position, check_weight, within};
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
 use crate::math;
@@ -82,7 +82,7 @@ impl LampKind for SpotLight {
         Self { position: Vec3::new(x, y, z), axis: Vec3::new(i, j, k), intensity, inner, outer }
     }
 
-    fn check(&self) -> Result<(), Fault> {
+    fn check(&self) -> Result<(), LampFault> {
         check_position("position", self.position, 0.0)?;
         check_axis("length of the axis", self.axis)?;
         check_weight("intensity", self.intensity)?;

@@ -10,8 +10,8 @@ use core::f32::consts::PI;
 use glam::{DVec3, Vec3};
 
 use super::{
-    Fault, LEAST_LENGTH, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_length, check_position, check_weight,
-    irradiance_of_directions, within,
+    LEAST_LENGTH, LampFault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_length, check_position,
+    check_weight, irradiance_of_directions, within,
 };
 use crate::geometry::{Aabb, Cone};
 use crate::light::POSITION_LIMIT;
@@ -72,7 +72,7 @@ impl LampKind for TubeLight {
         Self { ends: [Vec3::new(a, b, c), Vec3::new(d, e, f)], radius, radiance }
     }
 
-    fn check(&self) -> Result<(), Fault> {
+    fn check(&self) -> Result<(), LampFault> {
         check_length("radius", self.radius)?;
         self.ends.iter().try_for_each(|end| check_position("end", *end, self.radius))?;
         within("length", self.length(), [LEAST_LENGTH, 4.0 * POSITION_LIMIT], "at least 1e-15")?;
