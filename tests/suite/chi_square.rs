@@ -6,7 +6,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene, random_point, with_lobe};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
-use crate::common::tier::{some, tier};
+use crate::common::tier::{few, some, tier};
 use fanlight::{Arity, Hit, ShadingPoint, Splitting};
 use glam::Vec3;
 
@@ -104,16 +104,16 @@ fn contents() -> Vec<Content> {
 
 #[test]
 fn samples_fill_the_cells_of_triangles_as_the_density_says() {
-    check_cells(0);
+    check_cells(0, some);
 }
 
 #[test]
 fn samples_for_lobes_fill_the_cells_of_triangles_as_the_density_says() {
-    check_cells(LOBES);
+    check_cells(LOBES, few);
 }
 
 /// With three kinds of receivers from `first` on.
-fn check_cells(first: usize) {
+fn check_cells(first: usize, some: fn(usize) -> Vec<usize>) {
     let contents = contents();
     let numbers = some(3 * contents.len());
     let count = numbers.len();

@@ -9,7 +9,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene};
 use crate::common::statistics::{Mean, chi_square, sidak};
-use crate::common::tier::tier;
+use crate::common::tier::{some, tier};
 use fanlight::{
     DiskLight, Emission, Error, Lamp, LightId, LightSample, LightSampler, LightSamplerView, Mesh, MeshId, MeshUpdate,
     PointLight, PointSampler, Receiver, SampledLight, ShadingPoint, Sides, SphereLight, Splitting, SpotLight,
@@ -314,9 +314,9 @@ fn each_kind_brings_the_irradiance_of_an_integral() {
 /// The density of directions integrates to the share of samples that are no `None` and have an extent.
 #[test]
 fn densities_of_directions_integrate_to_the_rate_of_samples() {
-    let rounds = 12;
-    let found = parallel::map(rounds, |round| {
-        let mut pcg = Pcg32::new(round as u64, 142);
+    let rounds = some(12);
+    let found = parallel::map(rounds.len(), |round| {
+        let mut pcg = Pcg32::new(rounds[round] as u64, 142);
         let mut results = Vec::new();
         for kind in kinds(&mut pcg) {
             for receiver in receivers(&mut pcg) {

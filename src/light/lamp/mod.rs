@@ -44,6 +44,10 @@ const VALUES: usize = 10;
 /// [`ShadingPoint::position`](crate::ShadingPoint::position).
 const FARTHEST_POINT: f32 = 1e15;
 
+/// Largest difference of the squared length of a rounded unit vector from 1. *Proved*: a component is off by at most 6e-8 of
+/// itself. Larger: a vector that is no unit vector would be taken for one.
+const UNIT_ROUNDING: f64 = 2.5e-7;
+
 /// Least radius and length. *Proved*: areas are normal numbers in single precision. A larger one would refuse tiny lamps.
 const LEAST_LENGTH: f32 = 1e-15;
 
@@ -346,7 +350,9 @@ impl LightKind for LampRecord {
     fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         let unit = direction.as_dvec3().try_normalize()?;
         let is_crossed = of_lamp!(self.lamp(), kind => kind.is_crossed(origin, unit));
-        is_crossed.then(|| LocalPoint::from_direction(unit.as_vec3()))
+        // A sample's own direction stays as it is: next to a rim, another rounding would have another density.
+        let is_unit = (direction.as_dvec3().length_squared() - 1.0).abs() <= UNIT_ROUNDING;
+        is_crossed.then(|| LocalPoint::from_direction(if is_unit { direction } else { unit.as_vec3() }))
     }
 }
 

@@ -63,3 +63,8 @@ pub(crate) fn tier() -> &'static Tier {
 pub(crate) fn some(count: usize) -> Vec<usize> {
     (0..count).step_by(tier().stride).collect()
 }
+
+/// Numbers below `count`: all of them, or one of many, where another test looks at the same family.
+pub(crate) fn few(count: usize) -> Vec<usize> {
+    (0..count).step_by(tier().stride.pow(2)).collect()
+}
