@@ -19,7 +19,7 @@
 use super::point::PointSampler;
 use crate::light::LightKind;
 use crate::math::{at_least, at_most};
-use crate::record::{LightSample, SampledLight};
+use crate::record::LightSample;
 use crate::warp::{Variate, seed};
 
 /// Least weight of a candidate with a positive target. *Proved*: what underflows stays possible, and the sum of any number of
@@ -124,10 +124,7 @@ impl PointSampler<'_> {
     /// Density of what a sample stands for: the point of an emitter, or the direction.
     fn density_of_contribution(&self, sample: &LightSample) -> f32 {
         let lights = &self.at.scene.lights;
-        let emits = |leaf: u32| !lights.light(leaf).is_portal();
-        match sample.light {
-            SampledLight::Triangle(hit) if lights.leaf(hit.triangle).is_some_and(emits) => sample.pdf,
-            _ => self.pdf_sample_direction(sample),
-        }
+        let emits = lights.leaf_of_sampled(&sample.light).is_some_and(|leaf| !lights.light(leaf).is_portal());
+        if emits { sample.pdf } else { self.pdf_sample_direction(sample) }
     }
 }

@@ -7,7 +7,7 @@ use crate::common::hostile::hostile;
 use crate::common::lights::{ARITIES, aligned, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
-use crate::common::scene::{Content, Scene};
+use crate::common::scene::{Content, Scene, with_lobe};
 use crate::common::statistics::{Mean, chi_square, sidak};
 use crate::common::tier::{some, tier};
 use fanlight::{
@@ -17,193 +17,14 @@ use fanlight::{
 };
 use glam::{DVec3, Vec3};
 
+mod twin;
+
+use twin::{Kind, Twin, disk, hollow_sphere, over_cap, point, sphere, spot, tube, weight};
+
 /// Significance of all cases of a test together.
 const SIGNIFICANCE: f64 = 0.01;
 /// Largest relative difference of two densities of one point.
 const TOLERANCE: f64 = 1e-5;
-
-/// A lamp, and what it sends to a point, by other means than those of the crate.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Twin {
-    Sphere { center: DVec3, radius: f64, two_sided: bool },
-    Point { position: DVec3 },
-    Spot { position: DVec3, axis: DVec3, angles: [f64; 2] },
-    Disk { center: DVec3, normal: DVec3, radius: f64, two_sided: bool },
-    Tube { ends: [DVec3; 2], radius: f64 },
-}
-
-/// A lamp together with its twin, of radiance or intensity 1.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Kind {
-    lamp: Lamp,
-    twin: Twin,
-}
-
-fn sphere(center: Vec3, radius: f32) -> Kind {
-    let twin = Twin::Sphere { center: center.as_dvec3(), radius: radius.into(), two_sided: false };
-    Kind { lamp: SphereLight::new(center, radius, 1.0).into(), twin }
-}
-
-fn hollow_sphere(center: Vec3, radius: f32) -> Kind {
-    let twin = Twin::Sphere { center: center.as_dvec3(), radius: radius.into(), two_sided: true };
-    Kind { lamp: SphereLight::new(center, radius, 1.0).sides(Sides::Two).into(), twin }
-}
-
-fn point(position: Vec3) -> Kind {
-    Kind { lamp: PointLight::new(position, 1.0).into(), twin: Twin::Point { position: position.as_dvec3() } }
-}
-
-fn spot(position: Vec3, axis: Vec3, angles: [f32; 2]) -> Kind {
-    let twin =
-        Twin::Spot { position: position.as_dvec3(), axis: axis.as_dvec3().normalize(), angles: angles.map(f64::from) };
-    Kind { lamp: SpotLight::new(position, axis, 1.0, angles).into(), twin }
-}
-
-fn disk(center: Vec3, normal: Vec3, radius: f32, sides: Sides) -> Kind {
-    let twin = Twin::Disk {
-        center: center.as_dvec3(),
-        normal: normal.as_dvec3().normalize(),
-        radius: radius.into(),
-        two_sided: sides == Sides::Two,
-    };
-    Kind { lamp: DiskLight::new(center, normal, radius, 1.0).sides(sides).into(), twin }
-}
-
-fn tube(ends: [Vec3; 2], radius: f32) -> Kind {
-    let twin = Twin::Tube { ends: ends.map(|end| end.as_dvec3()), radius: radius.into() };
-    Kind { lamp: TubeLight::new(ends, radius, 1.0).into(), twin }
-}
-
-impl Twin {
-    /// Share of the intensity that leaves in a unit direction; 1 for what has an extent.
-    fn falloff(&self, direction: DVec3) -> f64 {
-        let Self::Spot { axis, angles: [inner, outer], .. } = self else { return 1.0 };
-        let t = ((axis.dot(direction) - outer.cos()) / (inner.cos() - outer.cos())).clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
-    }
-
-    /// Radiance that arrives along a unit direction; nothing of what has no extent.
-    fn radiance(&self, origin: DVec3, direction: DVec3) -> f64 {
-        match *self {
-            Self::Sphere { center, radius, two_sided } => {
-                let to = center - origin;
-                let is_inside = to.length() <= radius;
-                let is_hit = to.dot(direction) > 0.0 && to.reject_from(direction).length() <= radius;
-                f64::from(u8::from(if is_inside { two_sided } else { is_hit }))
-            }
-            Self::Point { .. } | Self::Spot { .. } => 0.0,
-            Self::Disk { center, normal, radius, two_sided } => {
-                let height = (center - origin).dot(normal);
-                let distance = height / direction.dot(normal);
-                let is_hit = distance > 0.0 && (origin + distance * direction - center).length() <= radius;
-                f64::from(u8::from(is_hit && (height < 0.0 || two_sided)))
-            }
-            Self::Tube { ends: [start, end], radius } => {
-                // The first of both points of an endless cylinder, if the origin is outside of it.
-                let axis = (end - start).normalize();
-                let (across, from) = (direction.reject_from(axis), (origin - start).reject_from(axis));
-                let (a, b, c) = (across.length_squared(), across.dot(from), from.length_squared() - radius * radius);
-                let root = (b * b - a * c).sqrt();
-                let height = (origin - start + (-b - root) / a * direction).dot(axis);
-                let is_hit = c > 0.0 && b < 0.0 && height >= 0.0 && height <= (end - start).length();
-                f64::from(u8::from(is_hit))
-            }
-        }
-    }
-
-    /// Cone of directions that holds all of a sphere: unit axis and cosine of the half angle.
-    fn cone(&self, origin: DVec3) -> (DVec3, f64) {
-        match *self {
-            Self::Sphere { center, radius, .. } => ball(center - origin, radius),
-            _ => (DVec3::Z, -1.0),
-        }
-    }
-
-    /// Irradiance of what has no extent; of anything else by an integral over directions.
-    fn irradiance(&self, x: &ShadingPoint, steps: usize) -> f64 {
-        let origin = x.position.as_dvec3();
-        if let Self::Point { position } | Self::Spot { position, .. } = self {
-            let direction = (*position - origin).normalize();
-            return weight(x, direction) * self.falloff(-direction) / (*position - origin).length_squared();
-        }
-        self.integrate(origin, steps, |direction| weight(x, direction))
-    }
-
-    /// Integral over the directions from a point that the light sends to it in, by the midpoints of equal parts.
-    fn integrate(&self, origin: DVec3, steps: usize, f: impl Fn(DVec3) -> f64) -> f64 {
-        let middle = |i: usize| (i as f64 + 0.5) / steps as f64;
-        // Points of a surface, with normals and areas.
-        let surface = |point: &dyn Fn(f64, f64) -> (DVec3, DVec3, f64), two_sided: bool| {
-            let mut sum = 0.0;
-            for k in 0..steps * steps {
-                let (position, normal, area) = point(middle(k % steps), middle(k / steps));
-                let to = position - origin;
-                let cosine = -normal.dot(to) / to.length();
-                let cosine = if two_sided { cosine.abs() } else { cosine.max(0.0) };
-                if cosine > 0.0 {
-                    sum += f(to.normalize()) * cosine * area / to.length_squared();
-                }
-            }
-            sum / (steps * steps) as f64
-        };
-        match *self {
-            Self::Point { .. } | Self::Spot { .. } => 0.0,
-            Self::Sphere { .. } => {
-                let (axis, cos) = self.cone(origin);
-                over_cap(axis, cos, steps, |direction| self.radiance(origin, direction) * f(direction))
-            }
-            Self::Disk { center, normal, radius, two_sided } => {
-                let (s, t) = normal.any_orthonormal_pair();
-                let point = |u: f64, v: f64| {
-                    let (sin, cos) = (TAU * v).sin_cos();
-                    (center + radius * u.sqrt() * (s * cos + t * sin), normal, PI * radius * radius)
-                };
-                surface(&point, two_sided)
-            }
-            Self::Tube { ends: [a, b], radius } => {
-                let (s, t) = (b - a).normalize().any_orthonormal_pair();
-                let point = |u: f64, v: f64| {
-                    let (sin, cos) = (TAU * v).sin_cos();
-                    let normal = s * cos + t * sin;
-                    (a.lerp(b, u) + radius * normal, normal, TAU * radius * (b - a).length())
-                };
-                let is_inside = (origin - a).reject_from((b - a).normalize()).length() <= radius;
-                if is_inside { 0.0 } else { surface(&point, false) }
-            }
-        }
-    }
-}
-
-/// Directions to a ball.
-fn ball(center: DVec3, radius: f64) -> (DVec3, f64) {
-    let distance = center.length();
-    if distance <= radius { (DVec3::Z, -1.0) } else { (center / distance, (1.0 - (radius / distance).powi(2)).sqrt()) }
-}
-
-/// Weight of a direction at a shading point.
-fn weight(x: &ShadingPoint, direction: DVec3) -> f64 {
-    match x.receiver {
-        Receiver::Surface(normal) => normal.as_dvec3().dot(direction).max(0.0),
-        Receiver::Transmissive(normal) => normal.as_dvec3().dot(direction).abs(),
-        _ => 1.0,
-    }
-}
-
-/// Integral over the directions within an angle of an axis, by the midpoints of equal parts.
-fn over_cap(axis: DVec3, cos: f64, steps: usize, f: impl Fn(DVec3) -> f64) -> f64 {
-    let (s, t) = axis.any_orthonormal_pair();
-    let mut sum = 0.0;
-    for i in 0..steps {
-        // Without loss for narrow caps: one less the cosine.
-        let height = (1.0 - cos) * (i as f64 + 0.5) / steps as f64;
-        let radius = (height * (2.0 - height)).sqrt();
-        for j in 0..2 * steps {
-            let (sin, cos) = (PI * (j as f64 + 0.5) / steps as f64).sin_cos();
-            sum += f((s * cos + t * sin) * radius + axis * (1.0 - height));
-        }
-    }
-    sum * TAU * (1.0 - cos) / (2 * steps * steps) as f64
-}
 
 fn receivers(pcg: &mut Pcg32) -> [Receiver; 3] {
     [Receiver::Surface(pcg.direction()), Receiver::Transmissive(pcg.direction()), Receiver::Volume]
@@ -400,6 +221,7 @@ fn densities_of_samples_are_found_again_in_mixed_scenes() {
         for i in 0..40 {
             let receiver = receivers(&mut pcg)[i % 3];
             let x = ShadingPoint::new(2.0 * Vec3::from_array(pcg.cube()) - 0.5, receiver);
+            let x = if i % 2 == 1 { with_lobe(x, &mut pcg, 1e-3) } else { x };
             let at = lights.at(&x);
             for _ in 0..tier().agreement[1] / 20 {
                 let u = core::array::from_fn(|_| hostile(&mut pcg));
@@ -437,6 +259,30 @@ fn densities_of_samples_are_found_again_in_mixed_scenes() {
     });
     let [lamps, meshes] = found.iter().fold([0, 0], |sum, count| [sum[0] + count.0, sum[1] + count.1]);
     assert!(lamps > 1000 && meshes > 1000, "{lamps} samples of lamps, {meshes} of meshes");
+}
+
+/// Of lamps behind each other, each candidate stands for its own lamp.
+#[test]
+fn resampled_lamps_bring_what_samples_bring() {
+    let mut pcg = Pcg32::new(7, 146);
+    let lamps =
+        [sphere(Vec3::new(0.0, 0.0, 2.0), 0.5), sphere(Vec3::new(0.0, 0.1, 4.0), 1.0), point(Vec3::new(1.0, 0.0, 2.0))];
+    let lights = build(&lamps);
+    let x = ShadingPoint::surface(Vec3::ZERO, Vec3::new(0.6, 0.0, 0.8));
+    let at = lights.at(&x);
+    let exact: f64 = lamps.iter().map(|kind| kind.twin.irradiance(&x, 500)).sum();
+    let mut mean = Mean::default();
+    for _ in 0..40_000 {
+        let numbers: [[f32; 3]; 4] = core::array::from_fn(|_| pcg.cube());
+        // A target that prefers one side.
+        let chosen = at.sample_resampled(&numbers, pcg.f32(), |sample| 1.1 + sample.direction.y);
+        mean.add(chosen.map_or(0.0, |chosen| {
+            brought(&lamps, &x, &chosen.sample) * f64::from(chosen.sample.pdf) * f64::from(chosen.weight)
+        }));
+    }
+    let (found, error) = (mean.mean(), mean.error());
+    assert!((found - exact).abs() < 5.0 * error + 1e-3 * exact, "{found} ± {error} instead of {exact}");
+    assert!(error < 0.01 * exact, "{error} does not tell them apart");
 }
 
 /// All at once and from bytes, samples are the same.
