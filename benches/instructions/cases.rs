@@ -3,7 +3,7 @@
 use core::hint::black_box;
 
 use fanlight::{
-    Environment, Glossy, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver, ShadingPoint,
+    Environment, Glossy, Hit, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver, ShadingPoint,
     Splitting, Texture, TriangleId, Weight,
 };
 use glam::Vec3;
@@ -95,7 +95,7 @@ pub(crate) const ALL: &[Case] = &[
     Case {
         name: "environment-light/at",
         calls: CALLS,
-        run: || environment_light(|lights, x, _| black_box(&lights.at(x)).pmf(NONE)),
+        run: || environment_light(|lights, x, _| lights.at(x).pdf(&NOWHERE)),
     },
     Case {
         name: "environment-light/sample",
@@ -109,8 +109,9 @@ pub(crate) const ALL: &[Case] = &[
     },
 ];
 
-/// A triangle that no workload has.
-const NONE: TriangleId = TriangleId::new(MeshId::from_index(u32::MAX), 0);
+/// A point of a triangle that no workload has: its density costs what the first call at a shading point finds for all, and
+/// nothing more.
+const NOWHERE: Hit = Hit::new(TriangleId::new(MeshId::from_index(u32::MAX), 0), [0.0; 2]);
 
 /// Everything in here is counted, and nothing else.
 #[inline(never)]
@@ -272,12 +273,13 @@ fn cornell() {
     });
 }
 
+/// What all calls at a point share.
 fn at() {
     let scene = scenes::scene("window");
     let lights = lights(&scene);
     let points = lit_points(&scene, &lights);
     measured(|i| {
-        black_box(&lights.at(&points[i]));
+        black_box(lights.at(&points[i]).pdf(&NOWHERE));
     });
 }
 

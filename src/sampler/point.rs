@@ -20,14 +20,14 @@ const ENVIRONMENT_DISTANCE: f32 = 1e15;
 
 /// The lights as seen from one shading point: made by [`LightSampler::at`](crate::LightSampler::at).
 ///
-/// What all questions about one point share is found out once, by the first of them; above all which bright features of the
-/// environment are visible through the portals. A sampler is made for one point and one thread, and costs next to nothing
-/// where nothing is asked of it.
+/// What the calls at one point have in common is computed once, by the first of them: above all, which bright features of the
+/// environment are visible through the portals. A sampler belongs to one point and one thread. It costs next to nothing
+/// before its first call.
 #[derive(Debug)]
 #[must_use]
 pub struct PointSampler<'a> {
     pub(super) at: Viewpoint<'a>,
-    /// Completed in place: a mixture is large, and one that a function returns is copied.
+    /// Completed in place by the first call: a mixture is large, and one that a function returns is copied.
     mixture: RefCell<Mixture>,
 }
 
