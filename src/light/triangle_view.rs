@@ -20,7 +20,7 @@ use crate::warp::equal_area::sphere_to_square_quickly;
 /// Largest coordinate of a shading point that anything arrives at.
 ///
 /// Proved: squares of distances, 1e30, are finite, and so are their products with weights of up to 1e8.
-const FARTHEST_POINT: f32 = 1e15;
+pub(super) const FARTHEST_POINT: f32 = 1e15;
 
 /// A triangle is close if its squared radius is more than this many times the squared distance from its plane.
 ///

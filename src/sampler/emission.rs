@@ -59,8 +59,9 @@ impl EmissionSample {
 /// methods.
 ///
 /// What does not depend on the direction it is seen from (emitters, and portals to a constant environment) is drawn by
-/// its power, with cosine-distributed directions from surfaces, and uniform ones from lights without an extent. For portals to an image, a direction is drawn by radiance times the
-/// area that all portals turn towards it, then a point by transmittance and that area.
+/// its power, with cosine-distributed directions from surfaces, and uniform ones from lights without an extent. For portals
+/// to an image, a direction is drawn by radiance times the area that all portals turn towards it, then a point by
+/// transmittance and that area.
 ///
 /// An environment that is a light itself ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)) sends no
 /// photons here but through portals: where they would start depends on the extent of the host's scene.

@@ -72,8 +72,7 @@ pub(super) fn of_node(document: &Document, node: &Node) -> Result<Option<(Lamp, 
     Ok(Some((lamp, called)))
 }
 
-/// Adds a light to a scene of some diagonal. Every kind of light is made from what the renderer has: this function is
-/// the place to hand it over as what it is.
+/// Adds a light to a scene of some diagonal. The renderer has no lights without a surface, so each is made of what it has.
 pub(super) fn add(
     model: &mut Model,
     lamp: &Lamp,

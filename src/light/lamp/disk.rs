@@ -78,10 +78,6 @@ impl LampKind for DiskLight {
         check_weight("radiance", self.radiance)
     }
 
-    fn has_extent(&self) -> bool {
-        true
-    }
-
     fn weight(&self) -> f32 {
         self.radiance
     }

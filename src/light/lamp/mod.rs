@@ -16,6 +16,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 use super::emitted::EmittedRay;
+use super::triangle_view::FARTHEST_POINT;
 use super::{DrawnPoint, LightKind, LightTriangle, LightViewKind, LocalPoint, POSITION_LIMIT};
 use crate::blas;
 use crate::bounds::{LightBounds, Moments};
@@ -39,10 +40,6 @@ use tube::TubeView;
 
 /// Numbers that describe a lamp of any kind. *Format*: what the kind with the most numbers needs.
 const VALUES: usize = 10;
-
-/// Largest coordinate of a shading point that anything arrives at. *Format*: documented at
-/// [`ShadingPoint::position`](crate::ShadingPoint::position).
-const FARTHEST_POINT: f32 = 1e15;
 
 /// Largest difference of the squared length of a rounded unit vector from 1. *Proved*: a component is off by at most 6e-8 of
 /// itself. Larger: a vector that is no unit vector would be taken for one.
@@ -138,7 +135,9 @@ trait LampKind: Sized {
     fn check(&self) -> Result<(), LampFault>;
 
     /// Whether the lamp has an extent.
-    fn has_extent(&self) -> bool;
+    fn has_extent(&self) -> bool {
+        true
+    }
 
     /// Returns radiance or radiant intensity.
     fn weight(&self) -> f32;

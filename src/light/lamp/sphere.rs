@@ -72,10 +72,6 @@ impl LampKind for SphereLight {
         check_weight("radiance", self.radiance)
     }
 
-    fn has_extent(&self) -> bool {
-        true
-    }
-
     fn weight(&self) -> f32 {
         self.radiance
     }

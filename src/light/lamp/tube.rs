@@ -79,10 +79,6 @@ impl LampKind for TubeLight {
         check_weight("radiance", self.radiance)
     }
 
-    fn has_extent(&self) -> bool {
-        true
-    }
-
     fn weight(&self) -> f32 {
         self.radiance
     }

@@ -123,8 +123,8 @@ pub(super) struct Estimates<const N: usize> {
 impl<const N: usize> WideTree<'_, N> {
     /// Returns the weight of every child of a node. All zero where nothing below the node can be visible.
     ///
-    /// A child that is a node itself, and near the shading point or mixed for the lobe, is opened: the sum of its own children's weights is its
-    /// weight. That is one level, and depends on the shading point alone.
+    /// A child that is a node itself, and near the shading point or mixed for the lobe, is opened: the sum of its own
+    /// children's weights is its weight. That is one level, and depends on the shading point alone.
     #[inline(always)]
     pub(super) fn weights(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> [f32; N] {
         let node = &self.nodes[index];
