@@ -168,8 +168,10 @@ fn directions_fall_as_the_density_says() {
         let angle = f64::from(direction.y).atan2(direction.x.into()) / TAU + 0.5;
         z * BANDS + ((angle * BANDS as f64) as usize).min(BANDS - 1)
     };
-    let count = 12;
-    let found = parallel::map(count, |round| {
+    let rounds = some(12);
+    let count = rounds.len();
+    let found = parallel::map(count, |k| {
+        let round = rounds[k];
         let mut pcg = Pcg32::new(round as u64, 143);
         let lamps: Vec<Kind> = kinds(&mut pcg);
         let lights = build(&lamps);
