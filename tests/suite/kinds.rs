@@ -263,6 +263,29 @@ fn densities_of_samples_are_found_again_in_mixed_scenes() {
     assert!(lamps > 1000 && meshes > 1000, "{lamps} samples of lamps, {meshes} of meshes");
 }
 
+/// On the axis of a disk, the direction across it is nothing but rounding.
+#[test]
+fn disks_are_seen_from_their_axis() {
+    let mut pcg = Pcg32::new(8, 147);
+    for i in 0..3000 {
+        // Sums of like numbers are exact, and others are not.
+        let normal = if i % 2 == 0 { Vec3::ONE } else { pcg.direction() };
+        let (height, radius) = (10.0_f32.powf(pcg.within(-3.0, 3.0)), 10.0_f32.powf(pcg.within(-3.0, 3.0)));
+        let beside = if i % 3 == 0 { Vec3::ZERO } else { pcg.direction() * 10.0_f32.powf(pcg.within(-12.0, -4.0)) };
+        let lights = build(&[disk(height * (normal + beside), -normal, radius, Sides::One)]);
+        let at = lights.at(&ShadingPoint::volume(Vec3::ZERO));
+        let distance = f64::from(height) * f64::from(normal.length());
+        let cos = distance / distance.hypot(radius.into());
+        let solid_angle = TAU * (f64::from(radius) / distance.hypot(radius.into())).powi(2) / (1.0 + cos);
+        for _ in 0..4 {
+            let sample = at.sample(pcg.cube()).expect("the disk faces the point");
+            assert!((sample.direction.length() - 1.0).abs() < 1e-5, "{normal} {height} {radius} {beside}: {sample:?}");
+            let uniform = f64::from(sample.pdf) * solid_angle;
+            assert!((uniform - 1.0).abs() < 0.01, "{normal} {height} {radius} {beside}: {uniform}");
+        }
+    }
+}
+
 /// Of lamps behind each other, each candidate stands for its own lamp.
 #[test]
 fn resampled_lamps_bring_what_samples_bring() {
