@@ -107,7 +107,7 @@ fn densities_are_normalized_and_positive_where_light_is() {
     let mut pcg = Pcg32::new(2, 72);
     for (kind, sky) in skies().into_iter().enumerate() {
         let environment = sky.as_ref().map(Environment::as_view);
-        for (light, x) in scenes(&mut pcg, 30) {
+        for (light, x) in scenes(&mut pcg, 15) {
             let Some(view) =
                 TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v)
             else {
@@ -151,7 +151,7 @@ fn samples_follow_the_density() {
     let mut pcg = Pcg32::new(3, 72);
     for sky in skies() {
         let environment = sky.as_ref().map(Environment::as_view);
-        for (light, x) in scenes(&mut pcg, 6) {
+        for (light, x) in scenes(&mut pcg, 3) {
             let view =
                 TriangleView::wrapped(&light, &x, Illumination::default(), NO_CELLS, environment.as_ref(), |v| v);
             let Some(view) = view.filter(|view| LinearDensity::new(view).is_none()) else { continue };

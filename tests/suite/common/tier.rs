@@ -42,7 +42,7 @@ const THIN: Tier = Tier {
     points: 8,
     cases: 50,
     histogram: 30_000,
-    stride: 5,
+    stride: 7,
     inputs: 2000,
     triangles: 200_000,
     tiles: &[16, 64],
