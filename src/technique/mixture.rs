@@ -155,6 +155,14 @@ impl Mixture {
         let trees = Trees { first: self.first.as_ref(), splitting: Some(splitting) };
         Mixed { trees, mixture: self, shares: Shares { trees: 1.0, features, sky: 1.0 } }
     }
+
+    /// Estimates the irradiance from everything, as if there were no walls. Zero only where nothing can arrive.
+    pub(crate) fn irradiance(&self, at: &Viewpoint<'_>) -> f32 {
+        let first = self.first.or_else(|| at.scene.tlas.first_weights(at));
+        let features = self.features.as_ref().map_or(0.0, VisibleFeatures::irradiance);
+        let sky = self.sky.as_ref().map_or(0.0, Sky::irradiance);
+        trees::irradiance(at, first.as_ref()) + features + sky
+    }
 }
 
 /// The techniques with the share of each.

@@ -82,7 +82,7 @@ fn names_in_the_documentation_exist() {
         .collect();
     known.extend(FOREIGN.map(str::to_owned));
     let texts = ["README.md", "docs/ACCURACY.md", "docs/ARCHITECTURE.md", "docs/INTEGRATION.md", "docs/NOTATION.md"];
-    let more = ["docs/SPEED.md", "docs/STABILITY.md", "docs/gallery/README.md"];
+    let more = ["docs/FIRST_HOUR.md", "docs/SPEED.md", "docs/STABILITY.md", "docs/gallery/README.md"];
     let (mut unknown, mut count) = (Vec::new(), 0);
     for name in texts.into_iter().chain(more) {
         for (line, word) in names(&read(&root.join(name))) {

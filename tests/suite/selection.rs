@@ -203,3 +203,30 @@ fn windows_in_the_wall_of_the_point_are_not_chosen() {
         assert!(found.none <= 0.05, "coplanar-{own}-{across}: {} choose nothing", found.none);
     }
 }
+
+/// The estimate of the irradiance that a host may weigh its own lights against, relative to Lambert's formula.
+#[test]
+fn the_irradiance_is_about_that_of_all_lights() {
+    let (mut errors, mut count) = (Vec::new(), 0);
+    for (radius, lamps) in [(2.0, 1), (10.0, 20), (100.0, 20)] {
+        let lights = dome_with_lamps(radius, lamps);
+        let sampler = build(&lights, None);
+        for x in dome_points(radius) {
+            let each = lights.iter().flat_map(|light| (0..light.indices.len()).map(move |t| (light, t)));
+            let exact: f64 = each.map(|(light, t)| light.irradiance(t, x.position, DVec3::Z)).sum();
+            let estimate = f64::from(sampler.at(&x).irradiance());
+            assert!(estimate > 0.5 * exact && estimate < 2.0 * exact, "{x:?}: {estimate} instead of {exact}");
+            errors.push((estimate / exact - 1.0).abs());
+            count += 1;
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    println!("{count} points: median error {:.3}, largest {:.3}", median(&errors), errors[errors.len() - 1]);
+    assert!(median(&errors) < 0.1, "{}", median(&errors));
+    let below = ShadingPoint::surface(Vec3::new(0.0, 0.0, 5.0), Vec3::Z);
+    assert_eq!(build(&[Light::lamp(Vec3::Z)], None).at(&below).irradiance(), 0.0);
+    let sky = Environment::constant(2.0).expect("a good radiance");
+    let open = LightSampler::builder().environment(sky).environment_as_light().build().expect("no light is needed");
+    let found = open.at(&ShadingPoint::surface(Vec3::ZERO, Vec3::Y)).irradiance();
+    assert!((f64::from(found) / (2.0 * PI) - 1.0).abs() < 0.1, "{found}");
+}
