@@ -85,6 +85,8 @@ pub(crate) enum ErrorKind {
     UnknownLight { light: usize, lights: usize },
     /// A light without triangles that is not in the tree, for it emitted nothing, but would have to be.
     RevivedLight { light: usize },
+    /// A distant light in the place of one that is somewhere, or the other way round.
+    DistantReplaced { light: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -165,6 +167,9 @@ impl fmt::Display for Error {
             }
             ErrorKind::RevivedLight { light } => {
                 write!(f, "light {light} emits now, but emitted nothing when the sampler was built")
+            }
+            ErrorKind::DistantReplaced { light } => {
+                write!(f, "light {light}: a distant light can only take the place of a distant light")
             }
             ErrorKind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             ErrorKind::Cancelled => write!(f, "the build was cancelled"),

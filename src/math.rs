@@ -43,6 +43,25 @@ pub(crate) fn asin(x: f32) -> f32 {
     return libm::asinf(x);
 }
 
+/// [`asin`] in double precision.
+#[inline]
+pub(crate) fn asin64(x: f64) -> f64 {
+    let x = x.clamp(-1.0, 1.0);
+    #[cfg(feature = "std")]
+    return x.asin();
+    #[cfg(not(feature = "std"))]
+    return libm::asin(x);
+}
+
+/// [`atan2`] in double precision.
+#[inline]
+pub(crate) fn atan2_64(y: f64, x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return y.atan2(x);
+    #[cfg(not(feature = "std"))]
+    return libm::atan2(y, x);
+}
+
 /// Angle of the point `(x, y)` in `[-π, π]`.
 #[inline]
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {

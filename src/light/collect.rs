@@ -4,6 +4,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::distant::{self, DistantRecord};
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
 use super::{Energies, Illumination, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
 use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
@@ -220,6 +221,10 @@ impl<'a> LightCollection<'a> {
             Some(lamp) => self.lamps[lamp as usize].into_triangle(),
         };
         let records = parallel::collect(leaves.len(), record);
+        let distant = |lamp: &LampRecord| Some(DistantRecord::new(&lamp.distant()?, lamp.number(), u32::MAX));
+        let emits = |light: &DistantRecord| light.irradiance() > 0.0;
+        let mut distants: Vec<DistantRecord> = self.lamps.iter().filter_map(distant).filter(emits).collect();
+        let distant_groups = distant::arrange(&mut distants);
         Lights {
             illumination,
             energy: 0.0,
@@ -231,6 +236,8 @@ impl<'a> LightCollection<'a> {
             leaf_of,
             meshes: self.meshes,
             scales: Vec::new(),
+            distants,
+            distant_groups,
         }
     }
 

@@ -7,6 +7,7 @@
 mod cell_kernel;
 mod collect;
 mod crossing;
+mod distant;
 mod emitted;
 mod energy;
 mod illumination;
@@ -33,12 +34,14 @@ use crate::simd::prefetch;
 use crate::warp::Variate;
 
 pub(crate) use collect::LightCollection;
+pub(crate) use distant::{DistantGroup, DistantRecord, MOST_GROUPS};
 pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub use illumination::Illumination;
 use lamp::LampRecord;
 pub(crate) use lamp::LampView;
-pub use lamp::{DiskLight, Lamp, PointLight, SphereLight, SpotLight, TubeLight};
+use lamp::irradiance_of_cap;
+pub use lamp::{DiskLight, DistantLight, Lamp, PointLight, SphereLight, SpotLight, TubeLight};
 pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
@@ -78,6 +81,10 @@ buffers! {
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
+        /// Distant lights that can send something, neighbors in direction next to each other.
+        distants: DistantRecord = b"DIST" version 1,
+        /// Groups of them.
+        distant_groups: DistantGroup = b"DGRP" version 1,
     }
 }
 

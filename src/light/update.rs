@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use glam::Vec3;
 
+use super::distant::{self, DistantRecord};
 use super::mesh::{MeshUpdate, check_triangles};
 use super::{Lamp, LampRecord, LightKind, Lights, NO_AREA};
 use crate::blas;
@@ -28,17 +29,25 @@ impl Lights {
             let &leaf =
                 self.leaf_of[first..].get(light).ok_or(Error(ErrorKind::UnknownLight { light, lights: count }))?;
             let record = lamp.record(light as u32)?;
+            let is_distant = self.view().distant_of(LightId(light as u32)).is_some();
             match self.records.get(leaf as usize) {
-                None if record.weight() > 0.0 => Err(Error(ErrorKind::RevivedLight { light })),
+                _ if is_distant != matches!(lamp, Lamp::Distant(_)) && (is_distant || leaf < NO_AREA) => {
+                    Err(Error(ErrorKind::DistantReplaced { light }))
+                }
+                None if record.weight() > 0.0 && !is_distant => Err(Error(ErrorKind::RevivedLight { light })),
                 _ => Ok((leaf, record)),
             }
         };
         let replaced: Vec<(u32, LampRecord)> = updates.iter().map(replace).collect::<Result<_, _>>()?;
         for (leaf, record) in replaced {
+            if let (Some(light), Some(place)) = (record.distant(), self.view().distant_of(LightId(record.number()))) {
+                self.distants[place] = DistantRecord::new(&light, record.number(), self.distants[place].groups);
+            }
             if let Some(place) = self.records.get_mut(leaf as usize) {
                 *place = record.into_triangle();
             }
         }
+        self.distant_groups = distant::groups_of(&self.distants);
         Ok(())
     }
 

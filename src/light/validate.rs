@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::{Light, LightsView, NO_AREA};
+use super::{Light, LightsView, NO_AREA, distant};
 use crate::blas;
 use crate::error::Error;
 
@@ -15,6 +15,7 @@ impl LightsView<'_> {
         Error::unless_equal("mark of lamps", self.has_lamps.into(), (roots.len() < self.records.len()).into())?;
         blas::validate_roots(&roots, self.cells)?;
         self.validate_leaves()?;
+        distant::validate(self.distants, self.distant_groups)?;
         Error::unless_equal("start of the first mesh", self.meshes.first().map_or(0, |&start| start as usize), 0)?;
         let bad_mesh = self.meshes.windows(2).position(|pair| pair[0] > pair[1]);
         bad_mesh.map_or(Ok(()), |i| Err(Error::bytes("start of mesh", i, self.meshes[i], self.meshes[i + 1])))?;

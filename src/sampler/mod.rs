@@ -2,6 +2,7 @@
 
 mod builder;
 mod bytes;
+mod distant_rays;
 mod emission;
 mod finite;
 mod lights;

@@ -31,7 +31,7 @@ impl<'a> LightScene<'a> {
     /// Whether there may be a technique besides the trees.
     #[inline]
     pub(crate) fn has_more_than_trees(&self) -> bool {
-        self.sky.is_some() || self.has_features()
+        self.sky.is_some() || self.has_features() || !self.lights.distants.is_empty()
     }
 
     /// The environment, if what portals show depends on the direction.
@@ -64,7 +64,17 @@ pub(crate) struct Viewpoint<'a> {
     pub(crate) x: ShadingPoint,
 }
 
+/// Largest coordinate of a position at which anything arrives. *Format*: documented at
+/// [`ShadingPoint::position`](crate::ShadingPoint::position).
+const POSITION_LIMIT: f32 = 1e15;
+
 impl Viewpoint<'_> {
+    /// Whether anything can arrive at the position at all.
+    #[inline]
+    pub(crate) fn is_somewhere(&self) -> bool {
+        self.x.position.abs().cmple(Vec3::splat(POSITION_LIMIT)).all()
+    }
+
     /// Returns a light as seen from here; `None` if nothing can arrive from it.
     #[inline]
     pub(crate) fn view(&self, leaf: u32) -> Option<LightView<'_>> {

@@ -12,6 +12,7 @@ mod common;
 mod agreement;
 mod build;
 mod chi_square;
+mod distant;
 mod docs;
 mod double_check;
 mod emission;

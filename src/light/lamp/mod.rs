@@ -5,6 +5,7 @@
 //! every density is that of the rounded direction.
 
 mod disk;
+mod distant;
 mod point;
 mod sphere;
 mod spot;
@@ -30,6 +31,7 @@ use crate::warp::spherical_cap::SphericalCap;
 
 pub use disk::DiskLight;
 use disk::DiskView;
+pub use distant::DistantLight;
 pub use point::PointLight;
 use point::PointView;
 pub use sphere::SphereLight;
@@ -79,6 +81,8 @@ pub enum Lamp {
     Disk(DiskLight),
     /// The round surface of a cylinder.
     Tube(TubeLight),
+    /// A direction, or a cap of directions, infinitely far away.
+    Distant(DistantLight),
 }
 
 /// What is kept of every lamp that can emit light: in the same array as triangles, and as large as they are.
@@ -100,7 +104,7 @@ const _: () = assert!(
 
 /// A number that a lamp must not have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct LampFault {
+pub(super) struct LampFault {
     what: &'static str,
     value: f32,
     expected: &'static str,
@@ -217,6 +221,7 @@ macro_rules! of_lamp {
             Lamp::Spot($kind) => $call,
             Lamp::Disk($kind) => $call,
             Lamp::Tube($kind) => $call,
+            Lamp::Distant($kind) => $call,
         }
     };
 }
@@ -240,13 +245,18 @@ impl Lamp {
     ///
     /// If a number is not finite or out of its range.
     pub(crate) fn record(self, number: u32) -> Result<LampRecord, Error> {
-        let (kind, values) = of_lamp!(self, kind => {
-            kind.check().map_err(|LampFault { what, value, expected }| {
-                Error(ErrorKind::Lamp { light: number as usize, what, value, expected })
-            })?;
-            (code_of(&kind), kind.to_values())
-        });
+        self.check().map_err(|LampFault { what, value, expected }| {
+            Error(ErrorKind::Lamp { light: number as usize, what, value, expected })
+        })?;
+        let (kind, values) = of_lamp!(self, kind => (code_of(&kind), kind.to_values()));
         Ok(LampRecord { values, kind, number_and_mark: number | LightTriangle::LAMP })
+    }
+}
+
+impl Lamp {
+    /// Checks the numbers.
+    pub(super) fn check(&self) -> Result<(), LampFault> {
+        of_lamp!(self, kind => kind.check())
     }
 }
 
@@ -264,6 +274,7 @@ impl LampRecord {
             SpotLight::CODE => Lamp::Spot(SpotLight::from_values(self.values)),
             DiskLight::CODE => Lamp::Disk(DiskLight::from_values(self.values)),
             TubeLight::CODE => Lamp::Tube(TubeLight::from_values(self.values)),
+            DistantLight::CODE => Lamp::Distant(DistantLight::from_values(self.values)),
             _ => return None,
         })
     }
@@ -285,7 +296,15 @@ impl LampRecord {
 
     /// Whether the numbers, which may come from outside, are those of a lamp.
     pub(super) fn is_valid(&self) -> bool {
-        self.decode().is_some_and(|lamp| of_lamp!(lamp, kind => kind.check().is_ok()))
+        self.decode().is_some_and(|lamp| lamp.check().is_ok() && !matches!(lamp, Lamp::Distant(_)))
+    }
+
+    /// Returns the light as one that is infinitely far away; `None` for any other.
+    pub(super) fn distant(&self) -> Option<DistantLight> {
+        match self.lamp() {
+            Lamp::Distant(light) => Some(light),
+            _ => None,
+        }
     }
 
     /// Whether the lamp has an extent.
@@ -425,7 +444,7 @@ impl LightViewKind for LampView {
 }
 
 /// Estimates the irradiance from a cap of unit radiance. Zero only if nothing can arrive.
-fn irradiance_of_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
+pub(super) fn irradiance_of_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
     let sin = if cap.cos > 0.0 { cap.sin } else { 1.0 };
     irradiance_of_directions(receiver, cap.axis, sin, cap.solid_angle())
 }
