@@ -161,7 +161,8 @@ pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
 pub use light::{
-    DiskLight, DistantLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Sides, SphereLight, SpotLight, TubeLight, Weight,
+    DiskLight, DistantLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Sides, SphereLight, SpotLight,
+    TubeLight, Weight,
 };
 pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
 pub use record::{Filter, Hit, LightId, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};

@@ -6,11 +6,13 @@ use alloc::vec::Vec;
 
 use super::distant::{self, DistantRecord};
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
+use super::meshes::mesh_of;
 use super::{Energies, Illumination, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
 use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
 use crate::progress::Progress;
+use crate::receiver::ALL_GROUPS;
 use crate::record::{LightId, MeshId, TextureId};
 use crate::tlas::MAX_LEAVES;
 
@@ -29,8 +31,14 @@ pub(crate) struct LightCollection<'a> {
     indices: Vec<u32>,
     /// Where each mesh starts in `indices`, and the end.
     meshes: Vec<u32>,
+    /// Light groups of each mesh.
+    mesh_groups: Vec<u32>,
     /// Lights that are not made of triangles.
     lamps: Vec<LampRecord>,
+    /// Light groups of each.
+    lamp_groups: Vec<u32>,
+    /// Light groups of the environment.
+    pub(crate) environment_groups: u32,
     cells: Vec<CellNode>,
     /// Trees over functions by texture and the bits of the three uvs.
     shared: BTreeMap<TreeKey, Root>,
@@ -58,7 +66,10 @@ impl<'a> LightCollection<'a> {
             triangles: Vec::new(),
             indices: Vec::new(),
             meshes: vec![0],
+            mesh_groups: Vec::new(),
             lamps: Vec::new(),
+            lamp_groups: Vec::new(),
+            environment_groups: ALL_GROUPS,
             cells: Vec::new(),
             shared: BTreeMap::new(),
             images: Vec::new(),
@@ -104,16 +115,18 @@ impl<'a> LightCollection<'a> {
             }
         }
         self.meshes.push(self.indices.len() as u32);
+        self.mesh_groups.push(mesh.groups);
         Ok(MeshId(number as u32))
     }
 
     /// Adds a light that is not made of triangles. After an error the collection is as it was before.
-    pub(crate) fn add_lamp(&mut self, lamp: Lamp) -> Result<LightId, Error> {
+    pub(crate) fn add_lamp(&mut self, lamp: Lamp, groups: u32) -> Result<LightId, Error> {
         let number = self.lamps.len();
         if number >= MAX_LEAVES {
             return Err(Error(ErrorKind::TooMany { what: "lights", count: number + 1, limit: MAX_LEAVES }));
         }
         self.lamps.push(lamp.record(number as u32)?);
+        self.lamp_groups.push(groups);
         Ok(LightId(number as u32))
     }
 
@@ -185,6 +198,20 @@ impl<'a> LightCollection<'a> {
         }
     }
 
+    /// Returns the light groups of some lights by their indices; nothing if all lights are in all groups.
+    pub(crate) fn groups(&self, lights: &[u32]) -> Vec<u32> {
+        let all = [self.environment_groups];
+        let mut groups = self.mesh_groups.iter().chain(&self.lamp_groups).chain(&all);
+        if groups.all(|groups| *groups == ALL_GROUPS) {
+            return Vec::new();
+        }
+        let groups = |index: u32| match self.light(index) {
+            Light::Triangle(triangle) => self.mesh_groups[mesh_of(&self.meshes, triangle.index())],
+            Light::Lamp(lamp) => self.lamp_groups[lamp.number() as usize],
+        };
+        lights.iter().map(|&light| groups(light)).collect()
+    }
+
     /// Returns the energy of all lights together.
     pub(crate) fn total_energy(&self, energies: &Energies<'_>) -> f64 {
         energies.total(self.light_count(), |i| self.light(i as u32))
@@ -221,7 +248,14 @@ impl<'a> LightCollection<'a> {
             Some(lamp) => self.lamps[lamp as usize].into_triangle(),
         };
         let records = parallel::collect(leaves.len(), record);
-        let distant = |lamp: &LampRecord| Some(DistantRecord::new(&lamp.distant()?, lamp.number(), u32::MAX));
+        let mut groups = self.groups(leaves);
+        if !groups.is_empty() || self.environment_groups != ALL_GROUPS {
+            groups.push(self.environment_groups);
+        }
+        let distant = |lamp: &LampRecord| {
+            let groups = self.lamp_groups[lamp.number() as usize];
+            Some(DistantRecord::new(&lamp.distant()?, lamp.number(), groups))
+        };
         let emits = |light: &DistantRecord| light.irradiance() > 0.0;
         let mut distants: Vec<DistantRecord> = self.lamps.iter().filter_map(distant).filter(emits).collect();
         let distant_groups = distant::arrange(&mut distants);
@@ -236,6 +270,7 @@ impl<'a> LightCollection<'a> {
             leaf_of,
             meshes: self.meshes,
             scales: Vec::new(),
+            groups,
             distants,
             distant_groups,
         }

@@ -28,7 +28,7 @@ use crate::blas::{CellNode, Lattice};
 use crate::bounds::{LightBounds, Moments};
 use crate::buffers::buffers;
 use crate::env::EnvironmentView;
-use crate::receiver::ShadingPoint;
+use crate::receiver::{ALL_GROUPS, ShadingPoint};
 use crate::record::{Hit, LightId, MeshId, SampledLight, TriangleId};
 use crate::simd::prefetch;
 use crate::warp::Variate;
@@ -81,6 +81,8 @@ buffers! {
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
+        /// Light groups of every leaf, and of the environment as a light. Empty if all lights are in all groups.
+        groups: u32 = b"GRPS" version 1,
         /// Distant lights that can send something, neighbors in direction next to each other.
         distants: DistantRecord = b"DIST" version 1,
         /// Groups of them.
@@ -360,6 +362,17 @@ impl<'a> LightsView<'a> {
     #[inline(always)]
     pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
         Light::of(&self.records[leaf as usize])
+    }
+
+    /// Returns the light groups of a leaf.
+    #[inline(always)]
+    pub(crate) fn groups_of(&self, leaf: u32) -> u32 {
+        self.groups.get(leaf as usize).copied().unwrap_or(ALL_GROUPS)
+    }
+
+    /// Returns the light groups of the environment as a light.
+    pub(crate) fn groups_of_environment(&self) -> u32 {
+        self.groups.last().copied().unwrap_or(ALL_GROUPS)
     }
 
     /// Fetches the memory of the light in a leaf, so that a later look at it does not wait.

@@ -15,6 +15,9 @@ impl LightsView<'_> {
         Error::unless_equal("mark of lamps", self.has_lamps.into(), (roots.len() < self.records.len()).into())?;
         blas::validate_roots(&roots, self.cells)?;
         self.validate_leaves()?;
+        if !self.groups.is_empty() {
+            Error::unless_equal("number of light groups", self.groups.len(), self.len() + 1)?;
+        }
         distant::validate(self.distants, self.distant_groups)?;
         Error::unless_equal("start of the first mesh", self.meshes.first().map_or(0, |&start| start as usize), 0)?;
         let bad_mesh = self.meshes.windows(2).position(|pair| pair[0] > pair[1]);

@@ -61,8 +61,7 @@ impl DistantRays {
         let (sin, cos) = math::sin_cos((TAU * u2) as f32);
         let (s, t) = axis.as_dvec3().any_orthonormal_pair();
         let across = math::sqrt64(u1) * self.radius;
-        let position = self.center - self.radius * axis.as_dvec3()
-            + across * (f64::from(cos) * s + f64::from(sin) * t);
+        let position = self.center - self.radius * axis.as_dvec3() + across * (f64::from(cos) * s + f64::from(sin) * t);
         let pmf = f64::from(light.irradiance()) / self.irradiance;
         Some(EmissionSample {
             light: light.sampled(),

@@ -213,7 +213,8 @@ impl<'a> Emission<'a> {
         }
         let own = self.scene.lights.leaf_of_sampled(&ray.light);
         let distant = ray.light.id().and_then(|id| self.scene.lights.distant_of(id));
-        let others = self.ray_density(landed, -ray.direction, own) + self.distant_density(landed, -ray.direction, distant);
+        let others =
+            self.ray_density(landed, -ray.direction, own) + self.distant_density(landed, -ray.direction, distant);
         to_finite(f64::from(ray.pdf) + others)
     }
 

@@ -159,7 +159,7 @@ impl<'a> PointSampler<'a> {
     /// this is the probability with which [`Self::sample`] chooses the triangle.
     #[must_use]
     pub fn pmf(&self, triangle: TriangleId) -> f32 {
-        let leaf = self.at.scene.lights.leaf(triangle);
+        let leaf = self.at.scene.lights.leaf(triangle).filter(|leaf| self.at.receives(*leaf));
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
     }
 
@@ -169,7 +169,7 @@ impl<'a> PointSampler<'a> {
         if let Some(light) = self.at.scene.lights.distant_of(light) {
             return self.mixture().one().distant_pmf(&self.at, light) as f32;
         }
-        let leaf = self.at.scene.lights.leaf_of_lamp(light);
+        let leaf = self.at.scene.lights.leaf_of_lamp(light).filter(|leaf| self.at.receives(*leaf));
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
     }
 

@@ -62,12 +62,7 @@ impl Distant {
     }
 
     /// Draws a direction. `None` where nothing arrives from the light or group that the variates lead to.
-    pub(super) fn sample(
-        &self,
-        at: &Viewpoint<'_>,
-        choice: &mut Variate,
-        u: [Variate; 2],
-    ) -> Option<DistantDirection> {
+    pub(super) fn sample(&self, at: &Viewpoint<'_>, choice: &mut Variate, u: [Variate; 2]) -> Option<DistantDirection> {
         let group = pick(&self.weights, sum(&self.weights), choice);
         let group = at.scene.lights.distant_groups.get(group)?;
         let light = if group.lights().len() > 1 { pick_light(at, group, choice)? } else { group.lights().start };

@@ -78,7 +78,16 @@ impl Viewpoint<'_> {
     /// Returns a light as seen from here; `None` if nothing can arrive from it.
     #[inline]
     pub(crate) fn view(&self, leaf: u32) -> Option<LightView<'_>> {
+        if !self.receives(leaf) {
+            return None;
+        }
         self.scene.lights.view(leaf, &self.x, self.scene.directional_environment())
+    }
+
+    /// Whether the shading point receives any of the light groups that a light is in.
+    #[inline(always)]
+    pub(crate) fn receives(&self, leaf: u32) -> bool {
+        self.scene.lights.groups_of(leaf) & self.x.groups != 0
     }
 }
 
@@ -107,7 +116,7 @@ impl LeafOracle for Viewpoint<'_> {
 
     #[inline]
     fn is_visible(&self, leaf: u32) -> bool {
-        self.scene.lights.energy > 0.0 && self.scene.lights.light(leaf).is_visible(&self.x)
+        self.scene.lights.energy > 0.0 && self.receives(leaf) && self.scene.lights.light(leaf).is_visible(&self.x)
     }
 
     fn irradiance_per_area(&self, leaf: u32) -> f32 {

@@ -5,6 +5,7 @@
 
 mod beam;
 pub(in crate::tlas) mod descend;
+mod groups;
 mod importance;
 pub(in crate::tlas) mod ray;
 mod shaped;
