@@ -161,11 +161,11 @@ pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
 pub use light::{
-    DiskLight, DistantLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Sides, SphereLight, SpotLight,
-    TubeLight, Weight,
+    DiskLight, DistantLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Profile, ProfileLight, Sides,
+    SphereLight, SpotLight, TubeLight, Weight,
 };
 pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
-pub use record::{Filter, Hit, LightId, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
+pub use record::{Filter, Hit, LightId, LightSample, MeshId, ProfileId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
     ResampledLight,

@@ -5,15 +5,20 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::distant::{self, DistantRecord};
+use super::extras;
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
 use super::meshes::mesh_of;
-use super::{Energies, Illumination, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
+use super::profile::{Profile, ProfileCollection};
+use super::{
+    Energies, Extras, Illumination, Lamp, LampLight, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA,
+    NO_LEAF,
+};
 use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
 use crate::progress::Progress;
 use crate::receiver::ALL_GROUPS;
-use crate::record::{LightId, MeshId, TextureId};
+use crate::record::{LightId, MeshId, ProfileId, TextureId};
 use crate::tlas::MAX_LEAVES;
 
 /// What a textured weight is read from.
@@ -37,6 +42,9 @@ pub(crate) struct LightCollection<'a> {
     lamps: Vec<LampRecord>,
     /// Light groups of each.
     lamp_groups: Vec<u32>,
+    profiles: ProfileCollection,
+    /// The same as lights need them. Complete after [`Self::build_images`].
+    packed: Vec<u32>,
     /// Light groups of the environment.
     pub(crate) environment_groups: u32,
     cells: Vec<CellNode>,
@@ -69,6 +77,8 @@ impl<'a> LightCollection<'a> {
             mesh_groups: Vec::new(),
             lamps: Vec::new(),
             lamp_groups: Vec::new(),
+            profiles: ProfileCollection::default(),
+            packed: Vec::new(),
             environment_groups: ALL_GROUPS,
             cells: Vec::new(),
             shared: BTreeMap::new(),
@@ -125,9 +135,16 @@ impl<'a> LightCollection<'a> {
         if number >= MAX_LEAVES {
             return Err(Error(ErrorKind::TooMany { what: "lights", count: number + 1, limit: MAX_LEAVES }));
         }
-        self.lamps.push(lamp.record(number as u32)?);
+        let record = lamp.record(number as u32)?;
+        self.profiles.view().check(&record)?;
+        self.lamps.push(record);
         self.lamp_groups.push(groups);
         Ok(LightId(number as u32))
+    }
+
+    /// Adds a profile. After an error the collection is as it was before.
+    pub(crate) fn add_profile(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
+        self.profiles.add(profile)
     }
 
     /// Returns the units of work of [`Self::build_images`].
@@ -140,12 +157,13 @@ impl<'a> LightCollection<'a> {
         self.triangles.len() + self.lamps.len()
     }
 
-    /// Builds the trees over images. Only then the lights are complete.
+    /// Builds the trees over images, and packs the profiles. Only then the lights are complete.
     ///
     /// # Errors
     ///
     /// If there are too many nodes, or if the host has cancelled the build.
     pub(crate) fn build_images(&mut self, progress: &Progress<'_>) -> Result<(), Error> {
+        self.packed = extras::pack(&[], &[], &[], self.profiles.arrays());
         let trees = core::mem::take(&mut self.images);
         // One image after the other: only few pyramids exist at a time.
         let mut order: Vec<u32> = (0..trees.len() as u32).collect();
@@ -194,7 +212,10 @@ impl<'a> LightCollection<'a> {
         let index = index as usize;
         match self.triangles.get(index) {
             Some(triangle) => Light::Triangle(triangle),
-            None => Light::Lamp(&self.lamps[index - self.triangles.len()]),
+            None => Light::Lamp(LampLight {
+                record: &self.lamps[index - self.triangles.len()],
+                extras: Extras(&self.packed),
+            }),
         }
     }
 
@@ -207,7 +228,7 @@ impl<'a> LightCollection<'a> {
         }
         let groups = |index: u32| match self.light(index) {
             Light::Triangle(triangle) => self.mesh_groups[mesh_of(&self.meshes, triangle.index())],
-            Light::Lamp(lamp) => self.lamp_groups[lamp.number() as usize],
+            Light::Lamp(lamp) => self.lamp_groups[lamp.record.number() as usize],
         };
         lights.iter().map(|&light| groups(light)).collect()
     }
@@ -259,6 +280,7 @@ impl<'a> LightCollection<'a> {
         let emits = |light: &DistantRecord| light.irradiance() > 0.0;
         let mut distants: Vec<DistantRecord> = self.lamps.iter().filter_map(distant).filter(emits).collect();
         let distant_groups = distant::arrange(&mut distants);
+        let extras = extras::pack(&groups, &distants, &distant_groups, self.profiles.arrays());
         Lights {
             illumination,
             energy: 0.0,
@@ -270,9 +292,7 @@ impl<'a> LightCollection<'a> {
             leaf_of,
             meshes: self.meshes,
             scales: Vec::new(),
-            groups,
-            distants,
-            distant_groups,
+            extras,
         }
     }
 

@@ -326,9 +326,10 @@ pub(super) fn validate(lights: &[DistantRecord], groups: &[DistantGroup]) -> Res
     Error::unless_equal("number of distant lights", next, lights.len())
 }
 
-impl super::LightsView<'_> {
+impl super::Extras<'_> {
     /// Returns the place of a distant light among all; `None` for any other light, and one that emits nothing.
-    pub(crate) fn distant_of(&self, id: LightId) -> Option<usize> {
-        self.distants.iter().position(|light| light.number == id.0)
+    #[inline]
+    pub(crate) fn distant_of(self, id: LightId) -> Option<usize> {
+        if self.is_empty() { None } else { self.distants().iter().position(|light| light.number == id.0) }
     }
 }

@@ -7,11 +7,11 @@ use super::lights::LightSampler;
 use crate::blas::{Procedural, Texture};
 use crate::env::{Environment, RegionMoments};
 use crate::error::Error;
-use crate::light::{Energies, Illumination, Lamp, LightCollection, Mesh};
+use crate::light::{Energies, Illumination, Lamp, LightCollection, Mesh, Profile};
 use crate::parallel;
 use crate::progress::{Progress, Report};
 use crate::receiver::ALL_GROUPS;
-use crate::record::{LightId, MeshId, TextureId};
+use crate::record::{LightId, MeshId, ProfileId, TextureId};
 use crate::tlas::{self, Arity};
 
 /// Share of the time that lights take after which all of them have found their place; the rest is the collapse and the
@@ -178,6 +178,16 @@ impl<'a> LightSamplerBuilder<'a> {
     /// [`Procedural`] are not finite, negative or in the wrong order, or its weight is not within them.
     pub fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<MeshId, Error> {
         self.collection.add_mesh(mesh)
+    }
+
+    /// Adds a profile that [`ProfileLight`](crate::ProfileLight)s can refer to. After an error the builder is as it was before.
+    ///
+    /// # Errors
+    ///
+    /// If there are fewer than two vertical angles or no horizontal one, angles do not increase or are out of their ranges, or
+    /// an intensity is negative, not finite or above 1e30, or missing.
+    pub fn add_profile(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
+        self.collection.add_profile(profile)
     }
 
     /// Adds a light that is not made of triangles: see [`Lamp`]. After an error the builder is as it was before.

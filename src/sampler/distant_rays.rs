@@ -22,7 +22,7 @@ pub(super) struct DistantRays {
 impl DistantRays {
     /// Returns the rays into a ball; `None` where nothing is sent, or for a ball that is none.
     pub(super) fn new(lights: &LightsView<'_>, center: Vec3, radius: f32) -> Option<Self> {
-        let irradiance = lights.distants.iter().map(|light| f64::from(light.irradiance())).sum();
+        let irradiance = lights.extras().distants().iter().map(|light| f64::from(light.irradiance())).sum();
         let is_ball = radius > 0.0 && radius.is_finite() && center.is_finite();
         (irradiance > 0.0 && is_ball).then_some(Self { center: center.as_dvec3(), radius: radius.into(), irradiance })
     }
@@ -51,7 +51,7 @@ impl DistantRays {
             below += f64::from(light.irradiance());
             target < below
         };
-        let light = lights.distants.iter().find(is_chosen)?;
+        let light = lights.extras().distants().iter().find(is_chosen)?;
         let axis = if light.has_extent() {
             -light.cap().direction(direction.map(|u| u.value())).as_vec3()
         } else {
@@ -95,7 +95,12 @@ impl DistantRays {
         if beside > self.radius * self.radius {
             return 0.0;
         }
-        let met = lights.distants.iter().enumerate().filter(|(i, light)| Some(*i) != except && light.holds(towards));
+        let met = lights
+            .extras()
+            .distants()
+            .iter()
+            .enumerate()
+            .filter(|(i, light)| Some(*i) != except && light.holds(towards));
         met.map(|(_, light)| self.pdf(light)).sum()
     }
 }

@@ -184,8 +184,8 @@ impl<'a> Emission<'a> {
     /// that direction.
     #[must_use]
     pub fn pdf_light(&self, light: LightId, direction: Vec3) -> f32 {
-        if let (Some(place), Some((rays, share))) = (self.scene.lights.distant_of(light), &self.distant) {
-            let light = &self.scene.lights.distants[place];
+        if let (Some(place), Some((rays, share))) = (self.scene.lights.extras().distant_of(light), &self.distant) {
+            let light = &self.scene.lights.extras().distants()[place];
             return if light.sends(direction) { to_finite(share * rays.pdf(light)) } else { 0.0 };
         }
         let leaf = self.scene.lights.leaf_of_lamp(light);
@@ -212,7 +212,7 @@ impl<'a> Emission<'a> {
             return ray.pdf;
         }
         let own = self.scene.lights.leaf_of_sampled(&ray.light);
-        let distant = ray.light.id().and_then(|id| self.scene.lights.distant_of(id));
+        let distant = ray.light.id().and_then(|id| self.scene.lights.extras().distant_of(id));
         let others =
             self.ray_density(landed, -ray.direction, own) + self.distant_density(landed, -ray.direction, distant);
         to_finite(f64::from(ray.pdf) + others)

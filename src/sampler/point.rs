@@ -98,7 +98,7 @@ impl<'a> PointSampler<'a> {
         let DistantDirection { light, direction, pmf, pdf } = mixed.sample_distant(&self.at, choice, u)?;
         let pdf = to_positive(pdf);
         Some(LightSample {
-            light: self.at.scene.lights.distants.get(light)?.sampled(),
+            light: self.at.scene.lights.extras().distants().get(light)?.sampled(),
             position: self.at.x.position + direction * ENVIRONMENT_DISTANCE,
             normal: -direction,
             direction,
@@ -166,7 +166,7 @@ impl<'a> PointSampler<'a> {
     /// Returns the probability with which [`Self::sample`] chooses this light, which is not made of triangles, in `[0, 1]`.
     #[must_use]
     pub fn pmf_light(&self, light: LightId) -> f32 {
-        if let Some(light) = self.at.scene.lights.distant_of(light) {
+        if let Some(light) = self.at.scene.lights.extras().distant_of(light) {
             return self.mixture().one().distant_pmf(&self.at, light) as f32;
         }
         let leaf = self.at.scene.lights.leaf_of_lamp(light).filter(|leaf| self.at.receives(*leaf));
@@ -288,7 +288,7 @@ impl<'a> PointSampler<'a> {
     }
 
     fn pdf_of_lamp(&self, light: LightId, direction: Vec3, mixed: &Mixed<'_>) -> f32 {
-        if let Some(light) = self.at.scene.lights.distant_of(light) {
+        if let Some(light) = self.at.scene.lights.extras().distant_of(light) {
             return to_finite(mixed.distant_density(&self.at, light, direction));
         }
         let Some(point) = self.at.scene.lights.point_of_lamp(light, direction) else { return 0.0 };
@@ -309,13 +309,13 @@ impl<'a> PointSampler<'a> {
     /// Sum of the densities of a direction by the distant lights that it leads to, except one.
     fn distant_density(&self, direction: Vec3, except: Option<LightId>, mixed: &Mixed<'_>) -> f64 {
         let lights = &self.at.scene.lights;
-        if lights.distants.is_empty() {
+        if lights.extras().is_empty() {
             return 0.0;
         }
         let unit = direction.as_dvec3().normalize_or_zero();
-        let except = except.and_then(|id| lights.distant_of(id));
-        let is_met = |light: &usize| Some(*light) != except && lights.distants[*light].holds(unit);
-        let met = (0..lights.distants.len()).filter(is_met);
+        let except = except.and_then(|id| lights.extras().distant_of(id));
+        let is_met = |light: &usize| Some(*light) != except && lights.extras().distants()[*light].holds(unit);
+        let met = (0..lights.extras().distants().len()).filter(is_met);
         met.map(|light| mixed.distant_density(&self.at, light, unit.as_vec3())).sum()
     }
 

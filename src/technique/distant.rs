@@ -39,13 +39,13 @@ pub(crate) struct DistantDirection {
 impl Distant {
     /// Weighs all groups. `None` if nothing can arrive.
     pub(super) fn new(at: &Viewpoint<'_>) -> Option<Self> {
-        let groups = at.scene.lights.distant_groups;
+        let groups = at.scene.lights.extras().distant_groups();
         if !at.is_somewhere() {
             return None;
         }
         let mut weights = [0.0; MOST_GROUPS];
         for (weight, group) in weights.iter_mut().zip(groups) {
-            *weight = match at.scene.lights.distants.get(group.lights()) {
+            *weight = match at.scene.lights.extras().distants().get(group.lights()) {
                 _ if group.groups & at.x.groups == 0 => 0.0,
                 Some([light]) => light.weigh(at.x.receiver),
                 _ => group.weigh(at.x.receiver),
@@ -64,9 +64,9 @@ impl Distant {
     /// Draws a direction. `None` where nothing arrives from the light or group that the variates lead to.
     pub(super) fn sample(&self, at: &Viewpoint<'_>, choice: &mut Variate, u: [Variate; 2]) -> Option<DistantDirection> {
         let group = pick(&self.weights, sum(&self.weights), choice);
-        let group = at.scene.lights.distant_groups.get(group)?;
+        let group = at.scene.lights.extras().distant_groups().get(group)?;
         let light = if group.lights().len() > 1 { pick_light(at, group, choice)? } else { group.lights().start };
-        let view = at.scene.lights.distants.get(light)?.view(at.x.receiver);
+        let view = at.scene.lights.extras().distants().get(light)?.view(at.x.receiver);
         let direction = view.draw(u.map(|u| u.value()))?;
         let pmf = self.pmf(at, light);
         let pdf = pmf * view.pdf(direction);
@@ -75,7 +75,7 @@ impl Distant {
 
     /// Returns the probability of a light, by its place among all distant lights.
     pub(super) fn pmf(&self, at: &Viewpoint<'_>, light: usize) -> f64 {
-        let groups = at.scene.lights.distant_groups;
+        let groups = at.scene.lights.extras().distant_groups();
         let Some(index) = groups.iter().position(|group| group.lights().contains(&light)) else { return 0.0 };
         let weight = self.weights[index.min(MOST_GROUPS - 1)];
         if weight == 0.0 {
@@ -88,7 +88,9 @@ impl Distant {
     /// Returns the density per solid angle with which [`Self::sample`] draws a unit direction that leads to a light with an
     /// extent.
     pub(super) fn pdf(&self, at: &Viewpoint<'_>, light: usize, direction: Vec3) -> f64 {
-        let Some(record) = at.scene.lights.distants.get(light).filter(|record| record.has_extent()) else { return 0.0 };
+        let Some(record) = at.scene.lights.extras().distants().get(light).filter(|record| record.has_extent()) else {
+            return 0.0;
+        };
         match self.pmf(at, light) {
             0.0 => 0.0,
             pmf => pmf * record.view(at.x.receiver).pdf(direction),
@@ -103,7 +105,7 @@ fn weight(at: &Viewpoint<'_>, light: &DistantRecord) -> f64 {
 
 /// Sum of the weights of a group's lights.
 fn total(at: &Viewpoint<'_>, group: &DistantGroup) -> f64 {
-    at.scene.lights.distants[group.lights()].iter().map(|light| weight(at, light)).sum()
+    at.scene.lights.extras().distants()[group.lights()].iter().map(|light| weight(at, light)).sum()
 }
 
 /// Chooses a light of a group by its weight. `None` if nothing arrives from any.
@@ -112,7 +114,7 @@ fn pick_light(at: &Viewpoint<'_>, group: &DistantGroup, choice: &mut Variate) ->
     let target = choice.value() * total;
     let (mut chosen, mut below) = (None, 0.0);
     for light in group.lights() {
-        let weight = weight(at, &at.scene.lights.distants[light]);
+        let weight = weight(at, &at.scene.lights.extras().distants()[light]);
         if weight > 0.0 {
             chosen = Some(light);
             below += weight;
@@ -126,7 +128,7 @@ fn pick_light(at: &Viewpoint<'_>, group: &DistantGroup, choice: &mut Variate) ->
 
 /// Returns the probability with which [`pick_light`] chooses a light.
 fn pmf_of_light(at: &Viewpoint<'_>, group: &DistantGroup, light: usize) -> f64 {
-    match weight(at, &at.scene.lights.distants[light]) {
+    match weight(at, &at.scene.lights.extras().distants()[light]) {
         0.0 => 0.0,
         weight => weight / total(at, group),
     }

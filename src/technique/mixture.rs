@@ -99,11 +99,11 @@ impl Mixture {
         if at.scene.has_features() {
             self.add_features(at);
         }
-        let receives_sky = at.scene.lights.groups_of_environment() & at.x.groups != 0;
+        let receives_sky = at.scene.lights.extras().groups_of_environment() & at.x.groups != 0;
         if let Some(regions) = at.scene.sky.filter(|_| receives_sky) {
             self.add_sky(at, regions);
         }
-        if !at.scene.lights.distants.is_empty() {
+        if !at.scene.lights.extras().distants().is_empty() {
             self.add_distant(at);
         }
     }

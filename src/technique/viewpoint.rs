@@ -31,7 +31,7 @@ impl<'a> LightScene<'a> {
     /// Whether there may be a technique besides the trees.
     #[inline]
     pub(crate) fn has_more_than_trees(&self) -> bool {
-        self.sky.is_some() || self.has_features() || !self.lights.distants.is_empty()
+        self.sky.is_some() || self.has_features() || !self.lights.extras().is_empty()
     }
 
     /// The environment, if what portals show depends on the direction.
@@ -87,7 +87,7 @@ impl Viewpoint<'_> {
     /// Whether the shading point receives any of the light groups that a light is in.
     #[inline(always)]
     pub(crate) fn receives(&self, leaf: u32) -> bool {
-        self.scene.lights.groups_of(leaf) & self.x.groups != 0
+        self.scene.lights.extras().groups_of(leaf) & self.x.groups != 0
     }
 }
 

@@ -30,6 +30,7 @@ mod memory;
 mod near;
 mod normalisation;
 mod procedural;
+mod profiles;
 mod properties;
 mod refit;
 mod selection;

@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 use super::{LampFault, LampKind, Reach, ShapeView, VALUES, check_axis, check_weight, within};
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
+use crate::light::profile::Profiles;
 use crate::math;
 use crate::receiver::ShadingPoint;
 use crate::warp::Variate;
@@ -115,11 +116,11 @@ impl LampKind for DistantLight {
     }
 
     /// Zero, so that nothing of the light is in the tree.
-    fn area(&self) -> f32 {
+    fn area(&self, _profiles: Profiles<'_>) -> f32 {
         0.0
     }
 
-    fn reach(&self) -> Reach {
+    fn reach(&self, _profiles: Profiles<'_>) -> Reach {
         Reach {
             aabb: Aabb { min: Vec3::ZERO, max: Vec3::ZERO },
             normals: Cone::single(self.axis),
@@ -131,7 +132,7 @@ impl LampKind for DistantLight {
         }
     }
 
-    fn view(&self, _x: &ShadingPoint) -> Option<ShapeView> {
+    fn view(&self, _x: &ShadingPoint, _profiles: Profiles<'_>) -> Option<ShapeView> {
         None
     }
 
@@ -140,11 +141,11 @@ impl LampKind for DistantLight {
     }
 
     /// Never called, as nothing of the light is in the tree.
-    fn emit(&self, _point: [Variate; 2], _direction: [Variate; 2], _side: f64) -> EmittedRay {
+    fn emit(&self, _point: [Variate; 2], _direction: [Variate; 2], _side: f64, _profiles: Profiles<'_>) -> EmittedRay {
         EmittedRay::from_point(Vec3::ZERO, self.axis, 0.0)
     }
 
-    fn emission_pdf(&self, _direction: Vec3) -> f64 {
+    fn emission_pdf(&self, _direction: Vec3, _profiles: Profiles<'_>) -> f64 {
         0.0
     }
 }
