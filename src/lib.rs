@@ -167,7 +167,7 @@ pub use light::{
 pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
 pub use record::{Filter, Hit, LightId, LightSample, MeshId, ProfileId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
-    ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
-    ResampledLight,
+    ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler, RaySegment,
+    ResampledLight, SegmentSample, SegmentSampler,
 };
 pub use tlas::{Arity, Splitting};

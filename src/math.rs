@@ -62,6 +62,33 @@ pub(crate) fn atan2_64(y: f64, x: f64) -> f64 {
     return libm::atan2(y, x);
 }
 
+/// Exponential function, in double precision.
+#[inline]
+pub(crate) fn exp64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.exp();
+    #[cfg(not(feature = "std"))]
+    return libm::exp(x);
+}
+
+/// Logarithm of one more than a number, in double precision.
+#[inline]
+pub(crate) fn ln_1p64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.ln_1p();
+    #[cfg(not(feature = "std"))]
+    return libm::log1p(x);
+}
+
+/// Exponential function less one, in double precision.
+#[inline]
+pub(crate) fn exp_m1_64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.exp_m1();
+    #[cfg(not(feature = "std"))]
+    return libm::expm1(x);
+}
+
 /// Angle of the point `(x, y)` in `[-π, π]`.
 #[inline]
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {

@@ -370,6 +370,12 @@ impl<'a> LightsView<'a> {
         Extras(self.extras)
     }
 
+    /// Returns a portal's vertices, and whether it has two sides; `None` for any other light.
+    pub(crate) fn portal(&self, leaf: u32) -> Option<([Vec3; 3], bool)> {
+        let triangle = self.light(leaf).triangle().filter(|triangle| triangle.is_portal())?;
+        Some((triangle.triangle().0, triangle.is_two_sided()))
+    }
+
     /// Fetches the memory of the light in a leaf, so that a later look at it does not wait.
     #[inline(always)]
     pub(crate) fn prefetch(&self, leaf: u32) {

@@ -12,14 +12,12 @@ use glam::Vec3;
 use super::Viewpoint;
 use crate::light::{DistantGroup, DistantRecord, MOST_GROUPS};
 use crate::math::only_if;
-use crate::warp::{Variate, keep_positive, pick, sum};
+use crate::warp::{Variate, keep_positive, pick, pmf, sum};
 
-/// Distant lights as seen from one shading point.
+/// Distant lights as seen from one shading point: no more than what balances them with the rest, as every shading point has
+/// room for it. Weights are computed anew for each question.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distant {
-    /// Weights of the groups.
-    weights: [f32; MOST_GROUPS],
-    /// Sum of the weights before any was raised.
     irradiance: f32,
 }
 
@@ -39,21 +37,11 @@ pub(crate) struct DistantDirection {
 impl Distant {
     /// Weighs all groups. `None` if nothing can arrive.
     pub(super) fn new(at: &Viewpoint<'_>) -> Option<Self> {
-        let groups = at.scene.lights.extras().distant_groups();
         if !at.is_somewhere() {
             return None;
         }
-        let mut weights = [0.0; MOST_GROUPS];
-        for (weight, group) in weights.iter_mut().zip(groups) {
-            *weight = match at.scene.lights.extras().distants().get(group.lights()) {
-                _ if group.groups & at.x.groups == 0 => 0.0,
-                Some([light]) => light.weigh(at.x.receiver),
-                _ => group.weigh(at.x.receiver),
-            };
-        }
-        let irradiance = sum(&weights).min(f64::from(f32::MAX)) as f32;
-        keep_positive(&mut weights);
-        (irradiance > 0.0).then_some(Self { weights, irradiance })
+        let irradiance = sum(&weights(at)).min(f64::from(f32::MAX)) as f32;
+        (irradiance > 0.0).then_some(Self { irradiance })
     }
 
     /// Estimate of the irradiance.
@@ -63,7 +51,8 @@ impl Distant {
 
     /// Draws a direction. `None` where nothing arrives from the light or group that the variates lead to.
     pub(super) fn sample(&self, at: &Viewpoint<'_>, choice: &mut Variate, u: [Variate; 2]) -> Option<DistantDirection> {
-        let group = pick(&self.weights, sum(&self.weights), choice);
+        let weights = weights(at);
+        let group = pick(&weights, sum(&weights), choice);
         let group = at.scene.lights.extras().distant_groups().get(group)?;
         let light = if group.lights().len() > 1 { pick_light(at, group, choice)? } else { group.lights().start };
         let view = at.scene.lights.extras().distants().get(light)?.view(at.x.receiver);
@@ -77,11 +66,10 @@ impl Distant {
     pub(super) fn pmf(&self, at: &Viewpoint<'_>, light: usize) -> f64 {
         let groups = at.scene.lights.extras().distant_groups();
         let Some(index) = groups.iter().position(|group| group.lights().contains(&light)) else { return 0.0 };
-        let weight = self.weights[index.min(MOST_GROUPS - 1)];
-        if weight == 0.0 {
+        let pmf = pmf(&weights(at), index.min(MOST_GROUPS - 1));
+        if pmf == 0.0 {
             return 0.0;
         }
-        let pmf = f64::from(weight) / sum(&self.weights);
         if groups[index].lights().len() > 1 { pmf * pmf_of_light(at, &groups[index], light) } else { pmf }
     }
 
@@ -96,6 +84,20 @@ impl Distant {
             pmf => pmf * record.view(at.x.receiver).pdf(direction),
         }
     }
+}
+
+/// Weights of the groups.
+fn weights(at: &Viewpoint<'_>) -> [f32; MOST_GROUPS] {
+    let (lights, mut weights) = (at.scene.lights.extras().distants(), [0.0; MOST_GROUPS]);
+    for (weight, group) in weights.iter_mut().zip(at.scene.lights.extras().distant_groups()) {
+        *weight = match lights.get(group.lights()) {
+            _ if group.groups & at.x.groups == 0 => 0.0,
+            Some([light]) => light.weigh(at.x.receiver),
+            _ => group.weigh(at.x.receiver),
+        };
+    }
+    keep_positive(&mut weights);
+    weights
 }
 
 /// Weight of a light in its group.

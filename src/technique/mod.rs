@@ -9,6 +9,7 @@
 mod distant;
 mod features;
 mod mixture;
+mod segment;
 mod sky;
 mod trees;
 mod viewpoint;
@@ -20,6 +21,7 @@ use crate::warp::{Variate, seed};
 
 pub(crate) use distant::DistantDirection;
 pub(crate) use mixture::{Drawn, Mixed, Mixture};
+pub(crate) use segment::{Distances, MediumSegment};
 pub(crate) use sky::SkyDirection;
 pub(crate) use viewpoint::{LightScene, Viewpoint};
 

@@ -1,5 +1,7 @@
 //! Everything that techniques draw from, and the same as seen from one shading point.
 
+use core::f64::consts::PI;
+
 use glam::Vec3;
 
 use crate::env::{EnvironmentView, RegionMoments};
@@ -82,6 +84,16 @@ impl Viewpoint<'_> {
             return None;
         }
         self.scene.lights.view(leaf, &self.x, self.scene.directional_environment())
+    }
+
+    /// Estimates the irradiance from all that is infinitely far away and needs no portal: the same at all places.
+    pub(crate) fn irradiance_everywhere(&self) -> f64 {
+        let extras = self.scene.lights.extras();
+        let receives = |groups: u32| groups & self.x.groups != 0;
+        let distants = extras.distants().iter().filter(|light| receives(light.groups));
+        let distant: f64 = distants.map(|light| f64::from(light.weigh(self.x.receiver))).sum();
+        let is_lit = self.scene.sky.is_some() && receives(extras.groups_of_environment());
+        distant + if is_lit { 4.0 * PI * f64::from(self.scene.environment.mean()) } else { 0.0 }
     }
 
     /// Whether the shading point receives any of the light groups that a light is in.

@@ -7,7 +7,8 @@ use crate::common::scene::with_lobe;
 use crate::common::statistics::{Mean, chi_square, sidak};
 use fanlight::{
     Arity, DistantLight, Environment, Filter, Hit, LightId, LightSample, LightSampler, LightSamplerView, Mesh, MeshId,
-    PointLight, Receiver, SampledLight, ShadingPoint, SphereLight, Splitting, TriangleId, Weight,
+    PointLight, Profile, ProfileLight, Receiver, SampledLight, ShadingPoint, SphereLight, Splitting, TriangleId,
+    Weight,
 };
 use glam::Vec3;
 
@@ -15,7 +16,7 @@ use glam::Vec3;
 const SIGNIFICANCE: f64 = 0.01;
 
 /// Groups of all that is in a scene.
-struct Groups {
+pub(crate) struct Groups {
     meshes: Vec<u32>,
     lamps: Vec<u32>,
     environment: u32,
@@ -33,7 +34,7 @@ impl Groups {
 }
 
 /// Lights of all kinds in up to eight groups.
-fn scene(number: usize, pcg: &mut Pcg32) -> (LightSampler, Groups) {
+pub(crate) fn scene(number: usize, pcg: &mut Pcg32) -> (LightSampler, Groups) {
     let mut sky = vec![0.5; 32 * 32];
     if number % 3 == 0 {
         sky[9 * 32 + 12] = 1e4;
@@ -60,13 +61,17 @@ fn scene(number: usize, pcg: &mut Pcg32) -> (LightSampler, Groups) {
         builder.add_mesh(&mesh.groups(set)).expect("a valid mesh");
         groups.meshes.push(set);
     }
+    let profile =
+        Profile { vertical: &[0.0, 0.4, 1.1], horizontal: &[0.0, 2.0], intensities: &[3.0, 3.0, 1.0, 2.0, 0.0, 0.5] };
+    let profile = builder.add_profile(&profile).expect("a valid profile");
     for i in 0..[2, 8, 45][number % 3] {
         let (at, set) = (2.0 * Vec3::from_array(pcg.cube()), draw(pcg));
-        let added = match i % 4 {
+        let added = match i % 5 {
             0 => builder.add_light_to(set, SphereLight::new(at, 0.1, 2.0)),
             1 => builder.add_light_to(set, PointLight::new(at, 1.0)),
             2 => builder.add_light_to(set, DistantLight::new(pcg.direction(), 0.5).angular_radius(0.2)),
-            _ => builder.add_light_to(set, DistantLight::new(pcg.direction(), 0.2)),
+            3 => builder.add_light_to(set, DistantLight::new(pcg.direction(), 0.2)),
+            _ => builder.add_light_to(set, ProfileLight::new(at, pcg.direction(), profile, 1.0)),
         };
         added.expect("a valid light");
         groups.lamps.push(set);

@@ -33,6 +33,7 @@ mod procedural;
 mod profiles;
 mod properties;
 mod refit;
+mod segments;
 mod selection;
 mod stress;
 mod suns;
