@@ -19,7 +19,7 @@ use crate::warp::equal_area::sphere_to_square;
 use crate::warp::projected_cap::ProjectedCap;
 use crate::warp::spherical_cap::SphericalCap;
 
-/// Most groups. *Chosen*: a budget of time for each shading point and of memory.
+/// Most groups. *Format*: bytes hold no more. Chosen as a budget of time for each shading point.
 ///
 /// Larger: shading points weigh more lights one by one. Smaller: of few lights already, some share a group.
 pub(crate) const MOST_GROUPS: usize = 32;

@@ -88,7 +88,7 @@ pub struct SegmentSample {
 /// The lights as seen from a stretch of a ray: made by [`LightSampler::along`].
 ///
 /// A distance is chosen by what is expected to arrive there: near lights, by the angle along the ray (equiangular sampling),
-/// in the beams that bright features of the environment send through portals, and by transmittance alone for the rest. Then a
+/// where the environment shines in through portals, and by transmittance alone for the rest. Then a
 /// light is chosen as from any point in a medium. Both densities are known for any distance and direction.
 #[derive(Clone, Debug)]
 #[must_use]

@@ -99,11 +99,12 @@ impl Mixture {
         if at.scene.has_features() {
             self.add_features(at);
         }
-        let receives_sky = at.scene.lights.extras().groups_of_environment() & at.x.groups != 0;
+        let extras = at.scene.lights.extras();
+        let receives_sky = extras.is_empty() || extras.groups_of_environment() & at.x.groups != 0;
         if let Some(regions) = at.scene.sky.filter(|_| receives_sky) {
             self.add_sky(at, regions);
         }
-        if !at.scene.lights.extras().distants().is_empty() {
+        if !extras.is_empty() && !extras.distants().is_empty() {
             self.add_distant(at);
         }
     }
@@ -199,9 +200,12 @@ impl Mixed<'_> {
     /// Chooses between the environment as a light and the lights that are somewhere. Returns whether it is the environment.
     #[inline(always)]
     pub(crate) fn chooses_sky(&self, choice: &mut Variate) -> bool {
+        if self.mixture.sky.is_none() {
+            return false;
+        }
         let Shares { sky, distant, .. } = self.shares;
-        let share = (sky / (1.0 - distant)) as f32;
-        self.mixture.sky.is_some() && pick_pair([share, 1.0 - share], choice) == 0
+        let share = if distant == 0.0 { sky } else { sky / (1.0 - distant) } as f32;
+        pick_pair([share, 1.0 - share], choice) == 0
     }
 
     /// Chooses between distant lights and all else. Returns whether it is a distant light. Asked before all other choices.

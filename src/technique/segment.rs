@@ -4,14 +4,15 @@
 //!
 //! - *clusters*: of clusters of lights, by the angle that the stretch subtends at each over its distance from the ray, and
 //!   equiangularly within (Kulla and Fajardo 2012, section 4.1);
-//! - *beams*: what bright features of the environment send through portals, summed up in bins along the ray;
+//! - *beams*: what the environment sends through portals, in bins along the ray: bright features by the shadows of the portals,
+//!   and the rest of an image by probes, the trees' own estimate at a few points;
 //! - *even*: by the transmittance alone, for all that arrives everywhere, and for what the others miss.
 
 use core::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::{LightScene, Viewpoint};
+use super::{LightScene, Viewpoint, trees};
 use crate::light::LightKind;
 use crate::math;
 use crate::receiver::ShadingPoint;
@@ -22,6 +23,10 @@ use crate::warp::{Variate, pick};
 ///
 /// Larger: narrow beams are met more closely. Smaller: more samples beside them.
 const BINS: usize = 32;
+/// Number of probes. *Chosen*: a budget of time; each weighs the root of the tree once.
+///
+/// Larger: more time for each segment. Smaller: hazy beams are met less closely.
+const PROBES: usize = 16;
 /// Most features whose beams are followed, the strongest. *Chosen*: others are left to the even share.
 ///
 /// Larger: more walks for each segment under a sky of many lamps. Smaller: more beams are left to the even share.
@@ -105,6 +110,8 @@ impl Distances {
         let sum = clusters.iter().map(|cluster| f64::from(cluster.weight)).sum();
         let mut distances = Self { segment, clusters, sum, bins: [0.0; BINS], beams: 0.0, shares: [0.0, 0.0, 1.0] };
         distances.find_beams(scene, groups);
+        distances.probe(scene, groups);
+        distances.beams = distances.bins.iter().map(|bin| f64::from(*bin)).sum();
         distances.balance(scene, groups);
         distances
     }
@@ -158,7 +165,22 @@ impl Distances {
                 }
             });
         }
-        self.beams = self.bins.iter().map(|bin| f64::from(*bin)).sum();
+    }
+
+    /// Sums up in bins what the trees expect where portals show an image.
+    fn probe(&mut self, scene: &LightScene<'_>, groups: u32) {
+        if !scene.lights.has_portals || scene.directional_environment().is_none() {
+            return;
+        }
+        let width = self.segment.length() / PROBES as f64;
+        for i in 0..PROBES {
+            let (start, end) = (i as f64 * width, (i + 1) as f64 * width);
+            let Stretch { origin, direction, .. } = self.segment.stretch;
+            let position = origin + (0.5 * (start + end)) as f32 * direction;
+            let at = Viewpoint { scene: *scene, x: ShadingPoint::volume(position).with_groups(groups) };
+            let first = scene.tlas.first_weights(&at);
+            self.fill(start, end, trees::irradiance(&at, first.as_ref()));
+        }
     }
 
     /// Adds light that arrives over a range of distances.
