@@ -307,16 +307,19 @@ impl<'a> PointSampler<'a> {
     }
 
     /// Sum of the densities of a direction by the distant lights that it leads to, except one.
+    #[inline(always)]
     fn distant_density(&self, direction: Vec3, except: Option<LightId>, mixed: &Mixed<'_>) -> f64 {
-        let lights = &self.at.scene.lights;
-        if lights.extras().is_empty() {
-            return 0.0;
-        }
+        if self.at.scene.lights.extras().is_empty() { 0.0 } else { self.sum_of_distant(direction, except, mixed) }
+    }
+
+    #[inline(never)]
+    fn sum_of_distant(&self, direction: Vec3, except: Option<LightId>, mixed: &Mixed<'_>) -> f64 {
+        let extras = self.at.scene.lights.extras();
         let unit = direction.as_dvec3().normalize_or_zero();
-        let except = except.and_then(|id| lights.extras().distant_of(id));
-        let is_met = |light: &usize| Some(*light) != except && lights.extras().distants()[*light].holds(unit);
-        let met = (0..lights.extras().distants().len()).filter(is_met);
-        met.map(|light| mixed.distant_density(&self.at, light, unit.as_vec3())).sum()
+        let except = except.and_then(|id| extras.distant_of(id));
+        let lights = extras.distants().iter().enumerate();
+        let met = lights.filter(|(light, record)| Some(*light) != except && record.holds(unit));
+        met.map(|(light, _)| mixed.distant_density(&self.at, light, unit.as_vec3())).sum()
     }
 
     /// Sum of the densities of all points along a ray, except those of one light.

@@ -168,7 +168,6 @@ impl<'a> SegmentSampler<'a> {
     }
 
     /// Returns the lights as seen from the point at a distance.
-    #[must_use]
     pub fn at(&self, distance: f32) -> PointSampler<'a> {
         self.lights.at(&self.segment.point(distance))
     }

@@ -148,6 +148,7 @@ impl Mixture {
     }
 
     /// Estimates the irradiance from all lights that are somewhere.
+    #[inline(always)]
     fn irradiance_of_lights(&mut self, at: &Viewpoint<'_>) -> f64 {
         match &self.features {
             Some(features) => features.total() + f64::from(self.rest),
@@ -211,8 +212,11 @@ impl Mixed<'_> {
     /// Chooses between distant lights and all else. Returns whether it is a distant light. Asked before all other choices.
     #[inline(always)]
     pub(crate) fn chooses_distant(&self, choice: &mut Variate) -> bool {
+        if self.mixture.distant.is_none() {
+            return false;
+        }
         let share = self.shares.distant as f32;
-        self.mixture.distant.is_some() && pick_pair([share, 1.0 - share], choice) == 0
+        pick_pair([share, 1.0 - share], choice) == 0
     }
 
     /// Draws a direction of a distant light, if anything can arrive from any.

@@ -5,6 +5,7 @@
 //! own, which the root joins, as it does for lights of different size ([`classes`](super::classes)).
 
 use alloc::collections::BTreeMap;
+use alloc::vec;
 use alloc::vec::Vec;
 
 use smallvec::SmallVec;
@@ -57,8 +58,7 @@ impl Tlas {
 
     fn note<const N: usize>(&mut self, groups: impl Fn(u32) -> u32) {
         let nodes: &[Node<N>] = bytemuck::cast_slice(&self.nodes);
-        let mut noted = Vec::new();
-        noted.resize(nodes.len() * N, 0);
+        let mut noted = vec![0; nodes.len() * N];
         // Children come after their parents.
         for (index, node) in nodes.iter().enumerate().rev() {
             let mut lanes = [0; MAX_LANES];
