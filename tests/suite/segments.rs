@@ -103,7 +103,7 @@ fn each_scene(mut visit: impl FnMut(&LightSampler, &mut Pcg32)) {
 #[test]
 fn densities_of_distances_integrate_to_one() {
     each_scene(|lights, pcg| {
-        for _ in 0..6 {
+        for _ in 0..4 {
             let segment = segment(pcg);
             let along = lights.along(&segment);
             let steps = 40_000;
