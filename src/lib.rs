@@ -58,7 +58,8 @@
 //! extent [`PointLight`] and [`SpotLight`]. [`DistantLight`]s are in no tree and compete with it. [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a
 //! [`LightId`].
 //!
-//! Photons start with [`LightSampler::emission`].
+//! Photons start with [`LightSampler::emission`]. In participating media, [`LightSampler::along`] chooses a distance along a
+//! ray.
 //!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
 //! BSDF samples, or with [`Environment::sample`], or make the environment a light

@@ -194,8 +194,8 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// # Errors
     ///
-    /// If a number is not finite, the light reaches beyond a coordinate of 1e9, a length is not positive, or a radiance or an
-    /// intensity is negative or above 1e30.
+    /// If a number is not finite, the light reaches beyond a coordinate of 1e9, a length is not positive, a radiance, an
+    /// intensity or an irradiance is negative or above 1e30, or there is no such profile.
     pub fn add_light(&mut self, light: impl Into<Lamp>) -> Result<LightId, Error> {
         self.collection.add_lamp(light.into(), ALL_GROUPS)
     }

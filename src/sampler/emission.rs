@@ -32,7 +32,7 @@ pub struct EmissionSample {
     pub direction: Vec3,
     /// Density of the ray, finite and above zero: per area perpendicular to `direction` and, unless the direction was
     /// given, per solid angle. For a light without an extent, per solid angle alone: there intensity over density is the
-    /// power.
+    /// power. For a distant light without an extent, per area alone: there irradiance over density is the power.
     ///
     /// It counts this light alone; [`Emission::pdf_ray`] counts all that the ray passes.
     pub pdf: f32,
