@@ -85,6 +85,12 @@ pub(crate) enum ErrorKind {
     UnknownLight { light: usize, lights: usize },
     /// A light without triangles that is not in the tree, for it emitted nothing, but would have to be.
     RevivedLight { light: usize },
+    /// A value of a profile that is NaN, infinite or out of its range.
+    Profile { what: &'static str, at: usize, value: f32, expected: &'static str },
+    /// A profile that this builder did not give out.
+    UnknownProfile { light: usize, profile: usize, profiles: usize },
+    /// A distant light in the place of one that is somewhere, or the other way round.
+    DistantReplaced { light: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -165,6 +171,15 @@ impl fmt::Display for Error {
             }
             ErrorKind::RevivedLight { light } => {
                 write!(f, "light {light} emits now, but emitted nothing when the sampler was built")
+            }
+            ErrorKind::Profile { what, at, value, expected } => {
+                write!(f, "profile: {what} {at} is {value}, but must be {expected}")
+            }
+            ErrorKind::UnknownProfile { light, profile, profiles } => {
+                write!(f, "light {light}: there is no profile {profile}, but {profiles} profiles")
+            }
+            ErrorKind::DistantReplaced { light } => {
+                write!(f, "light {light}: a distant light can only take the place of a distant light")
             }
             ErrorKind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             ErrorKind::Cancelled => write!(f, "the build was cancelled"),

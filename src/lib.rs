@@ -55,10 +55,11 @@
 //! portal does not end a ray: where a second portal may lie on the way, use the first and the third.
 //!
 //! Lights that are not made of triangles are in the same tree: [`SphereLight`], [`DiskLight`], [`TubeLight`], and without an
-//! extent [`PointLight`] and [`SpotLight`]. [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a
+//! extent [`PointLight`] and [`SpotLight`]. [`DistantLight`]s are in no tree and compete with it. [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a
 //! [`LightId`].
 //!
-//! Photons start with [`LightSampler::emission`].
+//! Photons start with [`LightSampler::emission`]. In participating media, [`LightSampler::along`] chooses a distance along a
+//! ray.
 //!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
 //! BSDF samples, or with [`Environment::sample`], or make the environment a light
@@ -87,7 +88,6 @@
 //! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
-//! - distant lights without a position: directions. (A sun belongs into the environment.)
 //! - updates of a built sampler, except that the environment can be rotated, and that lights can move and change their
 //!   brightness ([`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
@@ -162,12 +162,13 @@ pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
 pub use light::{
-    DiskLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Sides, SphereLight, SpotLight, TubeLight, Weight,
+    DiskLight, DistantLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Profile, ProfileLight, Sides,
+    SphereLight, SpotLight, TubeLight, Weight,
 };
 pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
-pub use record::{Filter, Hit, LightId, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
+pub use record::{Filter, Hit, LightId, LightSample, MeshId, ProfileId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
-    ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
-    ResampledLight,
+    ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler, RaySegment,
+    ResampledLight, SegmentSample, SegmentSampler,
 };
 pub use tlas::{Arity, Splitting};

@@ -43,6 +43,52 @@ pub(crate) fn asin(x: f32) -> f32 {
     return libm::asinf(x);
 }
 
+/// [`asin`] in double precision.
+#[inline]
+pub(crate) fn asin64(x: f64) -> f64 {
+    let x = x.clamp(-1.0, 1.0);
+    #[cfg(feature = "std")]
+    return x.asin();
+    #[cfg(not(feature = "std"))]
+    return libm::asin(x);
+}
+
+/// [`atan2`] in double precision.
+#[inline]
+pub(crate) fn atan2_64(y: f64, x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return y.atan2(x);
+    #[cfg(not(feature = "std"))]
+    return libm::atan2(y, x);
+}
+
+/// Exponential function, in double precision.
+#[inline]
+pub(crate) fn exp64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.exp();
+    #[cfg(not(feature = "std"))]
+    return libm::exp(x);
+}
+
+/// Logarithm of one more than a number, in double precision.
+#[inline]
+pub(crate) fn ln_1p64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.ln_1p();
+    #[cfg(not(feature = "std"))]
+    return libm::log1p(x);
+}
+
+/// Exponential function less one, in double precision.
+#[inline]
+pub(crate) fn exp_m1_64(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.exp_m1();
+    #[cfg(not(feature = "std"))]
+    return libm::expm1(x);
+}
+
 /// Angle of the point `(x, y)` in `[-π, π]`.
 #[inline]
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {

@@ -4,13 +4,21 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::distant::{self, DistantRecord};
+use super::extras;
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
-use super::{Energies, Illumination, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
+use super::meshes::mesh_of;
+use super::profile::{Profile, ProfileCollection};
+use super::{
+    Energies, Extras, Illumination, Lamp, LampLight, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA,
+    NO_LEAF,
+};
 use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
 use crate::progress::Progress;
-use crate::record::{LightId, MeshId, TextureId};
+use crate::receiver::ALL_GROUPS;
+use crate::record::{LightId, MeshId, ProfileId, TextureId};
 use crate::tlas::MAX_LEAVES;
 
 /// What a textured weight is read from.
@@ -28,8 +36,17 @@ pub(crate) struct LightCollection<'a> {
     indices: Vec<u32>,
     /// Where each mesh starts in `indices`, and the end.
     meshes: Vec<u32>,
+    /// Light groups of each mesh.
+    mesh_groups: Vec<u32>,
     /// Lights that are not made of triangles.
     lamps: Vec<LampRecord>,
+    /// Light groups of each.
+    lamp_groups: Vec<u32>,
+    profiles: ProfileCollection,
+    /// The same as lights need them. Complete after [`Self::build_images`].
+    packed: Vec<u32>,
+    /// Light groups of the environment.
+    pub(crate) environment_groups: u32,
     cells: Vec<CellNode>,
     /// Trees over functions by texture and the bits of the three uvs.
     shared: BTreeMap<TreeKey, Root>,
@@ -57,7 +74,12 @@ impl<'a> LightCollection<'a> {
             triangles: Vec::new(),
             indices: Vec::new(),
             meshes: vec![0],
+            mesh_groups: Vec::new(),
             lamps: Vec::new(),
+            lamp_groups: Vec::new(),
+            profiles: ProfileCollection::default(),
+            packed: Vec::new(),
+            environment_groups: ALL_GROUPS,
             cells: Vec::new(),
             shared: BTreeMap::new(),
             images: Vec::new(),
@@ -103,17 +125,26 @@ impl<'a> LightCollection<'a> {
             }
         }
         self.meshes.push(self.indices.len() as u32);
+        self.mesh_groups.push(mesh.groups);
         Ok(MeshId(number as u32))
     }
 
     /// Adds a light that is not made of triangles. After an error the collection is as it was before.
-    pub(crate) fn add_lamp(&mut self, lamp: Lamp) -> Result<LightId, Error> {
+    pub(crate) fn add_lamp(&mut self, lamp: Lamp, groups: u32) -> Result<LightId, Error> {
         let number = self.lamps.len();
         if number >= MAX_LEAVES {
             return Err(Error(ErrorKind::TooMany { what: "lights", count: number + 1, limit: MAX_LEAVES }));
         }
-        self.lamps.push(lamp.record(number as u32)?);
+        let record = lamp.record(number as u32)?;
+        self.profiles.view().check(&record)?;
+        self.lamps.push(record);
+        self.lamp_groups.push(groups);
         Ok(LightId(number as u32))
+    }
+
+    /// Adds a profile. After an error the collection is as it was before.
+    pub(crate) fn add_profile(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
+        self.profiles.add(profile)
     }
 
     /// Returns the units of work of [`Self::build_images`].
@@ -126,12 +157,13 @@ impl<'a> LightCollection<'a> {
         self.triangles.len() + self.lamps.len()
     }
 
-    /// Builds the trees over images. Only then the lights are complete.
+    /// Builds the trees over images, and packs the profiles. Only then the lights are complete.
     ///
     /// # Errors
     ///
     /// If there are too many nodes, or if the host has cancelled the build.
     pub(crate) fn build_images(&mut self, progress: &Progress<'_>) -> Result<(), Error> {
+        self.packed = extras::pack(&[], &[], &[], self.profiles.arrays());
         let trees = core::mem::take(&mut self.images);
         // One image after the other: only few pyramids exist at a time.
         let mut order: Vec<u32> = (0..trees.len() as u32).collect();
@@ -180,8 +212,25 @@ impl<'a> LightCollection<'a> {
         let index = index as usize;
         match self.triangles.get(index) {
             Some(triangle) => Light::Triangle(triangle),
-            None => Light::Lamp(&self.lamps[index - self.triangles.len()]),
+            None => Light::Lamp(LampLight {
+                record: &self.lamps[index - self.triangles.len()],
+                extras: Extras(&self.packed),
+            }),
         }
+    }
+
+    /// Returns the light groups of some lights by their indices; nothing if all lights are in all groups.
+    pub(crate) fn groups(&self, lights: &[u32]) -> Vec<u32> {
+        let all = [self.environment_groups];
+        let mut groups = self.mesh_groups.iter().chain(&self.lamp_groups).chain(&all);
+        if groups.all(|groups| *groups == ALL_GROUPS) {
+            return Vec::new();
+        }
+        let groups = |index: u32| match self.light(index) {
+            Light::Triangle(triangle) => self.mesh_groups[mesh_of(&self.meshes, triangle.index())],
+            Light::Lamp(lamp) => self.lamp_groups[lamp.record.number() as usize],
+        };
+        lights.iter().map(|&light| groups(light)).collect()
     }
 
     /// Returns the energy of all lights together.
@@ -220,6 +269,18 @@ impl<'a> LightCollection<'a> {
             Some(lamp) => self.lamps[lamp as usize].into_triangle(),
         };
         let records = parallel::collect(leaves.len(), record);
+        let mut groups = self.groups(leaves);
+        if !groups.is_empty() || self.environment_groups != ALL_GROUPS {
+            groups.push(self.environment_groups);
+        }
+        let distant = |lamp: &LampRecord| {
+            let groups = self.lamp_groups[lamp.number() as usize];
+            Some(DistantRecord::new(&lamp.distant()?, lamp.number(), groups))
+        };
+        let emits = |light: &DistantRecord| light.irradiance() > 0.0;
+        let mut distants: Vec<DistantRecord> = self.lamps.iter().filter_map(distant).filter(emits).collect();
+        let distant_groups = distant::arrange(&mut distants);
+        let extras = extras::pack(&groups, &distants, &distant_groups, self.profiles.arrays());
         Lights {
             illumination,
             energy: 0.0,
@@ -231,6 +292,7 @@ impl<'a> LightCollection<'a> {
             leaf_of,
             meshes: self.meshes,
             scales: Vec::new(),
+            extras,
         }
     }
 

@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 use glam::DVec3;
 
-use super::{Light, LightKind, LightTriangle, Lights};
+use super::{Extras, Light, LightKind, LightTriangle, Lights};
 use crate::math::sqrt64;
 
 /// Most planes that lights may lie in. *Chosen*: a room has six.
@@ -91,9 +91,9 @@ impl Lights {
     fn is_mixture_crossed_once(&self) -> bool {
         let mut triangles = Vec::new();
         for record in &self.records {
-            match Light::of(record) {
+            match Light::of(record, Extras::NONE) {
                 Light::Triangle(triangle) => triangles.push(*triangle),
-                Light::Lamp(lamp) if lamp.has_extent() => return false,
+                Light::Lamp(lamp) if lamp.record.has_extent() => return false,
                 Light::Lamp(_) => {}
             }
         }

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::POSITION_LIMIT;
 use crate::error::{Error, ErrorKind};
+use crate::receiver::ALL_GROUPS;
 use crate::record::{MeshId, TextureId};
 
 /// The sides of a triangle that light leaves from. A triangle's vertices run counter-clockwise around its front.
@@ -44,6 +45,7 @@ pub struct Mesh<'a> {
     pub(super) uvs: &'a [Vec2],
     pub(super) weight: Weight,
     pub(super) sides: Sides,
+    pub(super) groups: u32,
 }
 
 impl core::fmt::Debug for Mesh<'_> {
@@ -56,6 +58,7 @@ impl core::fmt::Debug for Mesh<'_> {
             .field("uvs", &self.uvs.len())
             .field("weight", &self.weight)
             .field("sides", &self.sides)
+            .field("groups", &self.groups)
             .finish()
     }
 }
@@ -73,7 +76,15 @@ impl<'a> Mesh<'a> {
     }
 
     const fn new(kind: MeshKind, positions: &'a [Vec3], indices: &'a [[u32; 3]]) -> Self {
-        Self { kind, positions, indices, uvs: &[], weight: Weight::Constant(1.0), sides: Sides::One }
+        Self {
+            kind,
+            positions,
+            indices,
+            uvs: &[],
+            weight: Weight::Constant(1.0),
+            sides: Sides::One,
+            groups: ALL_GROUPS,
+        }
     }
 
     /// Sets what guides the density.
@@ -91,6 +102,13 @@ impl<'a> Mesh<'a> {
     /// Sets the sides that light leaves from.
     pub const fn sides(mut self, sides: Sides) -> Self {
         self.sides = sides;
+        self
+    }
+
+    /// Sets the light groups that the mesh is in, a set of bits; all by default. It sends light to the points that receive any of
+    /// them ([`ShadingPoint::with_groups`](crate::ShadingPoint::with_groups)). Photons leave it in any case.
+    pub const fn groups(mut self, groups: u32) -> Self {
+        self.groups = groups;
         self
     }
 }

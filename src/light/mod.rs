@@ -7,13 +7,16 @@
 mod cell_kernel;
 mod collect;
 mod crossing;
+mod distant;
 mod emitted;
 mod energy;
+mod extras;
 mod illumination;
 mod lamp;
 mod linear_density;
 mod mesh;
 mod meshes;
+mod profile;
 mod spherical_grid;
 mod triangle;
 mod triangle_view;
@@ -33,14 +36,18 @@ use crate::simd::prefetch;
 use crate::warp::Variate;
 
 pub(crate) use collect::LightCollection;
+pub(crate) use distant::{DistantGroup, DistantRecord, MOST_GROUPS};
 pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
+pub(crate) use extras::Extras;
 pub use illumination::Illumination;
-use lamp::LampRecord;
 pub(crate) use lamp::LampView;
-pub use lamp::{DiskLight, Lamp, PointLight, SphereLight, SpotLight, TubeLight};
+use lamp::irradiance_of_cap;
+pub use lamp::{DiskLight, DistantLight, Lamp, PointLight, ProfileLight, SphereLight, SpotLight, TubeLight};
+use lamp::{LampLight, LampRecord};
 pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
+pub use profile::Profile;
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
 pub(crate) use triangle_view::TriangleView;
 
@@ -78,6 +85,8 @@ buffers! {
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
+        /// Light groups, profiles and distant lights: see [`Extras`].
+        extras: u32 = b"XTRA" version 1,
     }
 }
 
@@ -87,7 +96,7 @@ pub(crate) enum Light<'a> {
     /// A triangle of an emissive mesh or of a portal.
     Triangle(&'a LightTriangle),
     /// Anything else.
-    Lamp(&'a LampRecord),
+    Lamp(LampLight<'a>),
 }
 
 /// A light of any kind as seen from a shading point.
@@ -306,11 +315,11 @@ impl LightView<'_> {
 impl<'a> Light<'a> {
     /// Returns the light of a record.
     #[inline(always)]
-    fn of(record: &'a LightTriangle) -> Self {
+    fn of(record: &'a LightTriangle, extras: Extras<'a>) -> Self {
         if record.index_and_flags & LightTriangle::LAMP == 0 {
             Light::Triangle(record)
         } else {
-            Light::Lamp(bytemuck::cast_ref(record))
+            Light::Lamp(LampLight { record: bytemuck::cast_ref(record), extras })
         }
     }
 
@@ -352,7 +361,19 @@ impl<'a> LightsView<'a> {
     /// Returns the light in a leaf.
     #[inline(always)]
     pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
-        Light::of(&self.records[leaf as usize])
+        Light::of(&self.records[leaf as usize], self.extras())
+    }
+
+    /// Returns what few scenes have.
+    #[inline(always)]
+    pub(crate) fn extras(&self) -> Extras<'a> {
+        Extras(self.extras)
+    }
+
+    /// Returns a portal's vertices, and whether it has two sides; `None` for any other light.
+    pub(crate) fn portal(&self, leaf: u32) -> Option<([Vec3; 3], bool)> {
+        let triangle = self.light(leaf).triangle().filter(|triangle| triangle.is_portal())?;
+        Some((triangle.triangle().0, triangle.is_two_sided()))
     }
 
     /// Fetches the memory of the light in a leaf, so that a later look at it does not wait.
@@ -377,7 +398,7 @@ impl<'a> LightsView<'a> {
             Light::Triangle(light) => {
                 TriangleView::wrapped(light, x, self.illumination, self.cells, environment, LightView::Triangle)
             }
-            Light::Lamp(lamp) => LampView::new(lamp, x).map(LightView::Lamp),
+            Light::Lamp(lamp) => LampView::new(&lamp, x).map(LightView::Lamp),
         }
     }
 
@@ -412,7 +433,7 @@ impl<'a> LightsView<'a> {
                 triangle: self.id(triangle),
                 barycentrics: point.lattice().to_barycentrics(),
             }),
-            Light::Lamp(lamp) => lamp.sampled(),
+            Light::Lamp(lamp) => lamp.record.sampled(),
         }
     }
 
@@ -421,7 +442,7 @@ impl<'a> LightsView<'a> {
     pub(crate) fn point_of_lamp(&self, id: LightId, direction: Vec3) -> Option<LightPoint> {
         let leaf = self.leaf_of_lamp(id)?;
         let Light::Lamp(lamp) = self.light(leaf) else { return None };
-        lamp.has_extent().then(|| LightPoint { leaf, point: LocalPoint::from_direction(direction) })
+        lamp.record.has_extent().then(|| LightPoint { leaf, point: LocalPoint::from_direction(direction) })
     }
 
     fn id(&self, triangle: &LightTriangle) -> TriangleId {

@@ -4,8 +4,10 @@ use alloc::vec::Vec;
 
 use glam::Vec3;
 
+use super::distant::{self, DistantRecord};
+use super::extras;
 use super::mesh::{MeshUpdate, check_triangles};
-use super::{Lamp, LampRecord, LightKind, Lights, NO_AREA};
+use super::{Lamp, LampRecord, Lights, NO_AREA};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
 use crate::geometry::Triangle;
@@ -28,18 +30,40 @@ impl Lights {
             let &leaf =
                 self.leaf_of[first..].get(light).ok_or(Error(ErrorKind::UnknownLight { light, lights: count }))?;
             let record = lamp.record(light as u32)?;
+            self.view().extras().profiles().check(&record)?;
+            let is_distant = self.view().extras().distant_of(LightId(light as u32)).is_some();
             match self.records.get(leaf as usize) {
-                None if record.weight() > 0.0 => Err(Error(ErrorKind::RevivedLight { light })),
+                _ if is_distant != matches!(lamp, Lamp::Distant(_)) && (is_distant || leaf < NO_AREA) => {
+                    Err(Error(ErrorKind::DistantReplaced { light }))
+                }
+                None if record.weight() > 0.0 && !is_distant => Err(Error(ErrorKind::RevivedLight { light })),
                 _ => Ok((leaf, record)),
             }
         };
         let replaced: Vec<(u32, LampRecord)> = updates.iter().map(replace).collect::<Result<_, _>>()?;
+        self.update_distants(&replaced);
         for (leaf, record) in replaced {
             if let Some(place) = self.records.get_mut(leaf as usize) {
                 *place = record.into_triangle();
             }
         }
         Ok(())
+    }
+
+    /// Replaces those distant lights that are among these.
+    fn update_distants(&mut self, replaced: &[(u32, LampRecord)]) {
+        let extras = self.view().extras();
+        if extras.distants().is_empty() {
+            return;
+        }
+        let mut distants = extras.distants().to_vec();
+        for (_, record) in replaced {
+            if let (Some(light), Some(place)) = (record.distant(), extras.distant_of(LightId(record.number()))) {
+                distants[place] = DistantRecord::new(&light, record.number(), distants[place].groups);
+            }
+        }
+        let groups = distant::groups_of(&distants);
+        extras::replace_distants(&mut self.extras, &distants, &groups);
     }
 
     /// Where the triangles of a mesh are in `leaf_of`.

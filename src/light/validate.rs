@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::{Light, LightsView, NO_AREA};
+use super::{Extras, Light, LightsView, NO_AREA};
 use crate::blas;
 use crate::error::Error;
 
@@ -10,11 +10,22 @@ impl LightsView<'_> {
     /// Checks that no lookup can leave a buffer, go around in circles or meet a number that is not finite.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         blas::validate(self.cells)?;
-        let triangle = |record| Light::of(record).triangle();
+        let triangle = |record| Light::of(record, Extras::NONE).triangle();
         let roots: Vec<blas::Root> = self.records.iter().filter_map(triangle).map(|triangle| triangle.root).collect();
         Error::unless_equal("mark of lamps", self.has_lamps.into(), (roots.len() < self.records.len()).into())?;
         blas::validate_roots(&roots, self.cells)?;
         self.validate_leaves()?;
+        self.extras().validate(self.len())?;
+        let count = self.extras().profiles().count();
+        let lamps = self.records.iter().filter_map(|record| match Light::of(record, Extras::NONE) {
+            Light::Lamp(lamp) => lamp.record.profile(),
+            Light::Triangle(_) => None,
+        });
+        for profile in lamps {
+            if profile as usize >= count {
+                return Err(Error::bytes("profile of a light", 0, profile, count));
+            }
+        }
         Error::unless_equal("start of the first mesh", self.meshes.first().map_or(0, |&start| start as usize), 0)?;
         let bad_mesh = self.meshes.windows(2).position(|pair| pair[0] > pair[1]);
         bad_mesh.map_or(Ok(()), |i| Err(Error::bytes("start of mesh", i, self.meshes[i], self.meshes[i + 1])))?;
@@ -40,7 +51,7 @@ impl LightsView<'_> {
             Light::Triangle(triangle) => {
                 Some(triangle.index()).filter(|&index| triangle.is_valid() && index < lamp_start)
             }
-            Light::Lamp(lamp) => lamp_start.checked_add(lamp.number()).filter(|_| lamp.is_valid()),
+            Light::Lamp(lamp) => lamp_start.checked_add(lamp.record.number()).filter(|_| lamp.record.is_valid()),
         };
         for leaf in 0..self.len() as u32 {
             if index(leaf).and_then(|index| self.leaf_of.get(index as usize)) != Some(&leaf) {

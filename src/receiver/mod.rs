@@ -49,7 +49,12 @@ pub struct ShadingPoint {
     pub position: Vec3,
     /// Weight of a direction at this point.
     pub receiver: Receiver,
+    /// Light groups that the point receives, a set of bits: a light arrives if it is in any of them. All by default.
+    pub groups: u32,
 }
+
+/// All light groups. *Format.*
+pub(crate) const ALL_GROUPS: u32 = u32::MAX;
 
 /// Largest difference of a squared length from 1 up to which a normal counts as a unit vector.
 ///
@@ -94,27 +99,37 @@ impl ShadingPoint {
             Receiver::Scattering(medium) if !medium.has_lobe() => Receiver::Volume,
             receiver @ (Receiver::Glossy(_) | Receiver::Scattering(_)) => receiver,
         };
-        Self { position, receiver }
+        Self { position, receiver, groups: ALL_GROUPS }
+    }
+
+    /// Sets the light groups that the point receives, a set of bits. All by default.
+    ///
+    /// A light arrives if it shares a group with the point: if `mesh.groups & x.groups` is not zero. All other lights have the
+    /// density zero here.
+    #[must_use]
+    pub const fn with_groups(mut self, groups: u32) -> Self {
+        self.groups = groups;
+        self
     }
 
     /// Returns a point on an opaque surface. `normal` is a unit vector to the side that light is gathered from; see
     /// [`Self::new`] for other lengths.
     #[must_use]
     pub fn surface(position: Vec3, normal: Vec3) -> Self {
-        Self { position, receiver: Receiver::Surface(unit(normal)) }
+        Self { position, receiver: Receiver::Surface(unit(normal)), groups: ALL_GROUPS }
     }
 
     /// Returns a point on a surface that gathers light from both sides. `normal` is a unit vector; see [`Self::new`] for
     /// other lengths.
     #[must_use]
     pub fn transmissive(position: Vec3, normal: Vec3) -> Self {
-        Self { position, receiver: Receiver::Transmissive(unit(normal)) }
+        Self { position, receiver: Receiver::Transmissive(unit(normal)), groups: ALL_GROUPS }
     }
 
     /// Returns a point in a participating medium.
     #[must_use]
     pub const fn volume(position: Vec3) -> Self {
-        Self { position, receiver: Receiver::Volume }
+        Self { position, receiver: Receiver::Volume, groups: ALL_GROUPS }
     }
 
     /// Returns a point on an opaque surface with a glossy lobe.

@@ -56,6 +56,24 @@ impl LightId {
     }
 }
 
+/// A profile that was added to a builder. Profiles are numbered from 0 in the order in which they are added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ProfileId(pub(crate) u32);
+
+impl ProfileId {
+    /// Returns the id of the profile with this number.
+    #[must_use]
+    pub const fn from_index(index: u32) -> Self {
+        Self(index)
+    }
+
+    /// Returns the number of the profile.
+    #[must_use]
+    pub const fn index(self) -> u32 {
+        self.0
+    }
+}
+
 /// One triangle of one mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]

@@ -7,10 +7,11 @@ use super::lights::LightSampler;
 use crate::blas::{Procedural, Texture};
 use crate::env::{Environment, RegionMoments};
 use crate::error::Error;
-use crate::light::{Energies, Illumination, Lamp, LightCollection, Mesh};
+use crate::light::{Energies, Illumination, Lamp, LightCollection, Mesh, Profile};
 use crate::parallel;
 use crate::progress::{Progress, Report};
-use crate::record::{LightId, MeshId, TextureId};
+use crate::receiver::ALL_GROUPS;
+use crate::record::{LightId, MeshId, ProfileId, TextureId};
 use crate::tlas::{self, Arity};
 
 /// Share of the time that lights take after which all of them have found their place; the rest is the collapse and the
@@ -105,6 +106,13 @@ impl<'a> LightSamplerBuilder<'a> {
         self
     }
 
+    /// Sets the light groups that the environment is in, a set of bits, where it is a light; all by default. A portal shows the
+    /// environment to those that see the portal, by the groups of the portal's own mesh.
+    pub fn environment_groups(mut self, groups: u32) -> Self {
+        self.collection.environment_groups = groups;
+        self
+    }
+
     /// Sets the arity of the tree over the lights, 16 by default.
     ///
     /// The wider the tree, the better its choices. On machines without AVX, 8 may be faster.
@@ -172,14 +180,35 @@ impl<'a> LightSamplerBuilder<'a> {
         self.collection.add_mesh(mesh)
     }
 
+    /// Adds a profile that [`ProfileLight`](crate::ProfileLight)s can refer to. After an error the builder is as it was before.
+    ///
+    /// # Errors
+    ///
+    /// If there are fewer than two vertical angles or no horizontal one, angles do not increase or are out of their ranges, or
+    /// an intensity is negative, not finite or above 1e30, or missing.
+    pub fn add_profile(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
+        self.collection.add_profile(profile)
+    }
+
     /// Adds a light that is not made of triangles: see [`Lamp`]. After an error the builder is as it was before.
     ///
     /// # Errors
     ///
-    /// If a number is not finite, the light reaches beyond a coordinate of 1e9, a length is not positive, or a radiance or an
-    /// intensity is negative or above 1e30.
+    /// If a number is not finite, the light reaches beyond a coordinate of 1e9, a length is not positive, a radiance, an
+    /// intensity or an irradiance is negative or above 1e30, or there is no such profile.
     pub fn add_light(&mut self, light: impl Into<Lamp>) -> Result<LightId, Error> {
-        self.collection.add_lamp(light.into())
+        self.collection.add_lamp(light.into(), ALL_GROUPS)
+    }
+
+    /// Adds a light that is not made of triangles to some light groups alone, a set of bits, as [`Mesh::groups`] does for a mesh.
+    /// The light stays in them when it is [replaced](LightSampler::refit_lights). After an error the builder is as it was
+    /// before.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::add_light`].
+    pub fn add_light_to(&mut self, groups: u32, light: impl Into<Lamp>) -> Result<LightId, Error> {
+        self.collection.add_lamp(light.into(), groups)
     }
 
     /// Builds the trees over textures, and the tree over all lights that can emit.
@@ -214,7 +243,8 @@ impl<'a> LightSamplerBuilder<'a> {
         let emitting = collection.emitting(&energies)?;
         let total = collection.total_energy(&energies);
         let bounds = |i: u32| energies.bounds(collection.light(emitting[i as usize]), total).0;
-        let (tlas, order) = tlas::build(self.arity, emitting.len(), &bounds, &progress)?;
+        let groups = collection.groups(&emitting);
+        let (tlas, order) = tlas::build_in_groups(self.arity, emitting.len(), &bounds, &groups, &progress)?;
         let leaves = parallel::collect(order.len(), |leaf| emitting[order[leaf] as usize]);
         let lights = collection.into_lights(self.illumination, &leaves);
         let is_light = self.environment_as_light && environment.mean() > 0.0;

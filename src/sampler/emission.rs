@@ -7,6 +7,7 @@ use core::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::distant_rays::DistantRays;
 use super::finite::{to_finite, to_positive};
 use super::lights::LightSamplerView;
 use crate::env::DirectionDistribution;
@@ -31,7 +32,7 @@ pub struct EmissionSample {
     pub direction: Vec3,
     /// Density of the ray, finite and above zero: per area perpendicular to `direction` and, unless the direction was
     /// given, per solid angle. For a light without an extent, per solid angle alone: there intensity over density is the
-    /// power.
+    /// power. For a distant light without an extent, per area alone: there irradiance over density is the power.
     ///
     /// It counts this light alone; [`Emission::pdf_ray`] counts all that the ray passes.
     pub pdf: f32,
@@ -64,7 +65,10 @@ impl EmissionSample {
 /// transmittance and that area.
 ///
 /// An environment that is a light itself ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)) sends no
-/// photons here but through portals: where they would start depends on the extent of the host's scene.
+/// photons here but through portals: where they would start depends on the extent of the host's scene. Neither do distant
+/// lights, until [`within`](Self::within) says where the scene is.
+///
+/// Photons know of no light groups: all lights send them.
 ///
 /// Made by [`LightSampler::emission`](crate::LightSampler::emission) in some microseconds; holds about 1.5 KB. Make it again
 /// after the environment has been rotated.
@@ -74,6 +78,8 @@ pub struct Emission<'a> {
     directions: DirectionDistribution,
     /// Probabilities of a ray that does not depend on the direction, and of one from the environment's image.
     shares: [f64; 2],
+    /// The rays of distant lights, and their probability.
+    distant: Option<(DistantRays, f64)>,
 }
 
 impl<'a> LightSamplerView<'a> {
@@ -96,7 +102,34 @@ impl<'a> Emission<'a> {
         let through = if is_image { directions.total() / mean } else { 0.0 };
         let total = f64::from(diffuse) + f64::from(through);
         let share = |power: f32| if power > 0.0 { f64::from(power) / total } else { 0.0 };
-        Self { scene, directions, shares: [share(diffuse), share(through)] }
+        Self { scene, directions, shares: [share(diffuse), share(through)], distant: None }
+    }
+
+    /// Makes distant lights send photons as well: into a ball that holds all of the host's scene. Each starts in a disk that
+    /// covers the ball, perpendicular to its direction.
+    ///
+    /// The density is per area perpendicular to the direction and, if the light has an extent, per solid angle. So the power of
+    /// a ray is radiance over density, or irradiance over density for a light without an extent. Without distant lights, or
+    /// with a radius that is not positive, nothing changes.
+    #[must_use]
+    pub fn within(mut self, center: Vec3, radius: f32) -> Self {
+        let Some(rays) = DistantRays::new(&self.scene.lights, center, radius) else { return self };
+        let others: f64 = self.power();
+        let share = rays.power() / (rays.power() + others);
+        self.shares = self.shares.map(|other| other * (1.0 - share));
+        self.distant = Some((rays, share));
+        self
+    }
+
+    /// Returns the power of all that is somewhere.
+    fn power(&self) -> f64 {
+        let diffuse = PI * outgoing_of_all(&self.scene, &Outgoing::Diffuse);
+        let [diffuse_share, through_share] = self.shares;
+        let diffuse = f64::from(diffuse) * f64::from(self.scene.lights.energy);
+        let mean = f64::from(self.scene.environment.mean_without_features());
+        let through = f64::from(self.directions.total()) * f64::from(self.scene.lights.energy) / mean;
+        let counted = |share: f64, power: f64| if share > 0.0 { power } else { 0.0 };
+        counted(diffuse_share, diffuse) + counted(through_share, through)
     }
 
     /// Draws a ray of light. `u` is uniform in `[0, 1)⁵`: the first number chooses the light, the next two the point on it,
@@ -106,10 +139,15 @@ impl<'a> Emission<'a> {
     /// power.
     #[must_use]
     pub fn sample(&self, u: [f32; 5]) -> Option<EmissionSample> {
+        let [mut choice, b1, b2, d1, d2] = variates(u);
+        if let Some((rays, share)) = &self.distant {
+            if pick_pair([*share as f32, 1.0 - *share as f32], &mut choice) == 0 {
+                return rays.sample(&self.scene.lights, *share, choice.value(), [b1, b2], [d1, d2]);
+            }
+        }
         if self.shares == [0.0; 2] {
             return None;
         }
-        let [mut choice, b1, b2, d1, d2] = variates(u);
         match pick_pair(self.shares.map(|share| share as f32), &mut choice) {
             0 => self.sample_diffuse(choice, [b1, b2], [d1, d2]),
             _ => {
@@ -146,6 +184,10 @@ impl<'a> Emission<'a> {
     /// that direction.
     #[must_use]
     pub fn pdf_light(&self, light: LightId, direction: Vec3) -> f32 {
+        if let (Some(place), Some((rays, share))) = (self.scene.lights.extras().distant_of(light), &self.distant) {
+            let light = &self.scene.lights.extras().distants()[place];
+            return if light.sends(direction) { to_finite(share * rays.pdf(light)) } else { 0.0 };
+        }
         let leaf = self.scene.lights.leaf_of_lamp(light);
         let density = |leaf| self.density(LightPoint { leaf, point: LocalPoint::NONE }, direction, 0.0);
         to_finite(leaf.map_or(0.0, density))
@@ -156,7 +198,7 @@ impl<'a> Emission<'a> {
     /// of [`Self::pdf`]; times the cosine at a surface it is a density per area of that surface.
     #[must_use]
     pub fn pdf_ray(&self, position: Vec3, towards: Vec3) -> f32 {
-        to_finite(self.ray_density(position, towards, None))
+        to_finite(self.ray_density(position, towards, None) + self.distant_density(position, towards, None))
     }
 
     /// Returns [`Self::pdf_ray`] of a ray that [`Self::sample`] has drawn, at the point where it has landed.
@@ -170,7 +212,16 @@ impl<'a> Emission<'a> {
             return ray.pdf;
         }
         let own = self.scene.lights.leaf_of_sampled(&ray.light);
-        to_finite(f64::from(ray.pdf) + self.ray_density(landed, -ray.direction, own))
+        let distant = ray.light.id().and_then(|id| self.scene.lights.extras().distant_of(id));
+        let others =
+            self.ray_density(landed, -ray.direction, own) + self.distant_density(landed, -ray.direction, distant);
+        to_finite(f64::from(ray.pdf) + others)
+    }
+
+    /// Sum of the densities of a line by distant lights, except one.
+    fn distant_density(&self, position: Vec3, towards: Vec3, except: Option<usize>) -> f64 {
+        let Some((rays, share)) = &self.distant else { return 0.0 };
+        share * rays.line_pdf(&self.scene.lights, position, towards, except)
     }
 
     /// Sum of the densities of all points along a line, except those of one light.

@@ -146,7 +146,7 @@ impl<'a> LightSamplerView<'a> {
     /// Returns the number of lights that can send anything: triangles, and lights that are not made of them.
     #[must_use]
     pub fn light_count(&self) -> usize {
-        self.scene.lights.len()
+        self.scene.lights.len() + self.scene.lights.extras().distants().len()
     }
 
     /// Returns the number of bytes that the structures take.

@@ -20,7 +20,7 @@ impl LightSamplerView<'_> {
         for (queries, samples) in queries.chunks(INTERLEAVED).zip(samples.chunks_mut(INTERLEAVED)) {
             // With bright features a sample is mostly the search for them, and with the environment as a light walks are
             // few. Lobes are of different kinds, and a step goes down for one kind at a time.
-            let is_apart = self.scene.has_features() || self.scene.sky.is_some();
+            let is_apart = self.scene.has_more_than_trees();
             if is_apart || queries.iter().any(|(x, _)| x.receiver.has_lobe()) {
                 let each = queries.iter().zip(samples);
                 each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));

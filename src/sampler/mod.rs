@@ -2,6 +2,7 @@
 
 mod builder;
 mod bytes;
+mod distant_rays;
 mod emission;
 mod finite;
 mod lights;
@@ -9,9 +10,11 @@ mod many;
 mod point;
 mod refit;
 mod resample;
+mod segment;
 
 pub use builder::LightSamplerBuilder;
 pub use emission::{Emission, EmissionSample};
 pub use lights::{ByteSizes, LightSampler, LightSamplerView};
 pub use point::PointSampler;
 pub use resample::ResampledLight;
+pub use segment::{RaySegment, SegmentSample, SegmentSampler};

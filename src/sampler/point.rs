@@ -8,7 +8,7 @@ use super::finite::{to_finite, to_positive};
 use crate::light::{LightPoint, LightView, LightViewKind};
 use crate::receiver::ShadingPoint;
 use crate::record::{Hit, LightId, LightSample, SampledLight, TriangleId};
-use crate::technique::{Drawn, Mixed, Mixture, SkyDirection, Variates, Viewpoint};
+use crate::technique::{DistantDirection, Drawn, Mixed, Mixture, SkyDirection, Variates, Viewpoint};
 use crate::tlas::Splitting;
 use crate::warp::{Variate, seed};
 
@@ -67,6 +67,9 @@ impl<'a> PointSampler<'a> {
         let mixture = self.mixture();
         let mixed = mixture.one();
         let mut variates = Variates::new(u);
+        if mixed.chooses_distant(&mut variates.choice) {
+            return self.sample_distant(&mixed, &mut variates.choice, variates.point);
+        }
         if mixed.chooses_sky(&mut variates.choice) {
             return self.sample_environment(&mixed, variates.point);
         }
@@ -86,6 +89,23 @@ impl<'a> PointSampler<'a> {
             pdf,
             pdf_area: pdf,
             pmf: to_positive(mixed.sky_pmf()),
+        })
+    }
+
+    /// Draws a direction of a distant light.
+    #[inline(never)]
+    fn sample_distant(&self, mixed: &Mixed<'_>, choice: &mut Variate, u: [Variate; 2]) -> Option<LightSample> {
+        let DistantDirection { light, direction, pmf, pdf } = mixed.sample_distant(&self.at, choice, u)?;
+        let pdf = to_positive(pdf);
+        Some(LightSample {
+            light: self.at.scene.lights.extras().distants().get(light)?.sampled(),
+            position: self.at.x.position + direction * ENVIRONMENT_DISTANCE,
+            normal: -direction,
+            direction,
+            distance: f32::INFINITY,
+            pdf,
+            pdf_area: pdf,
+            pmf: to_positive(pmf),
         })
     }
 
@@ -114,7 +134,8 @@ impl<'a> PointSampler<'a> {
     /// never infinite.
     ///
     /// That the ray meets the light is taken from the caller, whose own intersector has found it: rounding may take a
-    /// sampled direction past a small light.
+    /// sampled direction past a small light. Of a distant light with an extent, this is the density of a ray that leaves the
+    /// scene in one of its directions.
     #[must_use]
     pub fn pdf_light(&self, light: LightId, direction: Vec3) -> f32 {
         self.pdf_of_lamp(light, direction, &self.mixture().one())
@@ -124,8 +145,9 @@ impl<'a> PointSampler<'a> {
     /// a light ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)). Zero where it cannot; never
     /// infinite. `direction` need not have unit length.
     ///
-    /// In a scene without portals, this is the density of a ray that has left the scene. It counts no triangles: where the
-    /// ray can cross portals, what a host needs is [`Self::pdf_direction`].
+    /// In a scene without portals and distant lights, this is the density of a ray that has left the scene. It counts the
+    /// environment alone: where the ray can cross portals or lead to a distant light, what a host needs is
+    /// [`Self::pdf_direction`].
     #[must_use]
     pub fn pdf_environment(&self, direction: Vec3) -> f32 {
         to_finite(self.environment_density(direction, &self.mixture().one()))
@@ -137,14 +159,17 @@ impl<'a> PointSampler<'a> {
     /// this is the probability with which [`Self::sample`] chooses the triangle.
     #[must_use]
     pub fn pmf(&self, triangle: TriangleId) -> f32 {
-        let leaf = self.at.scene.lights.leaf(triangle);
+        let leaf = self.at.scene.lights.leaf(triangle).filter(|leaf| self.at.receives(*leaf));
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
     }
 
     /// Returns the probability with which [`Self::sample`] chooses this light, which is not made of triangles, in `[0, 1]`.
     #[must_use]
     pub fn pmf_light(&self, light: LightId) -> f32 {
-        let leaf = self.at.scene.lights.leaf_of_lamp(light);
+        if let Some(light) = self.at.scene.lights.extras().distant_of(light) {
+            return self.mixture().one().distant_pmf(&self.at, light) as f32;
+        }
+        let leaf = self.at.scene.lights.leaf_of_lamp(light).filter(|leaf| self.at.receives(*leaf));
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
     }
 
@@ -161,14 +186,15 @@ impl<'a> PointSampler<'a> {
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] goes in a direction: the sum over all points of all
-    /// lights that the ray from the shading point crosses, which the crate finds by its own traversal, and the environment if
-    /// it is a light. `direction` need not have unit length.
+    /// lights that the ray from the shading point crosses, which the crate finds by its own traversal, the distant lights with
+    /// an extent that it leads to, and the environment if it is a light. `direction` need not have unit length.
     #[must_use]
     pub fn pdf_direction(&self, direction: Vec3) -> f32 {
         let mixture = self.mixture();
         let mixed = mixture.one();
         let triangles = self.direction_density(direction, None, &mixed);
-        to_finite(triangles + self.environment_density(direction, &mixed))
+        let distant = self.distant_density(direction, None, &mixed);
+        to_finite(triangles + self.environment_density(direction, &mixed) + distant)
     }
 
     /// Returns [`Self::pdf_direction`] of a sample's own direction.
@@ -185,15 +211,19 @@ impl<'a> PointSampler<'a> {
         let mixture = self.mixture();
         let mixed = mixture.one();
         let own = self.at.scene.lights.leaf_of_sampled(&sample.light);
-        let environment = own.map_or(0.0, |_| self.environment_density(sample.direction, &mixed));
+        let environment = match sample.light {
+            SampledLight::Environment => 0.0,
+            _ => self.environment_density(sample.direction, &mixed),
+        };
         let is_alone = own.is_some() && self.at.scene.lights.is_crossed_once;
         let others = if is_alone { 0.0 } else { self.direction_density(sample.direction, own, &mixed) };
-        to_finite(f64::from(sample.pdf) + others + environment)
+        let distant = self.distant_density(sample.direction, sample.light.id(), &mixed);
+        to_finite(f64::from(sample.pdf) + others + environment + distant)
     }
 
     /// Draws one point from each part of the light tree that adaptive splitting visits (Conty Estevez and Kulla 2018,
-    /// section 5.4), one towards a bright feature of the environment if any is visible through a portal, and one direction of
-    /// the environment if that is a light, and adds them to `samples`.
+    /// section 5.4), one towards a bright feature of the environment if any is visible through a portal, one direction of
+    /// the environment if that is a light, and one of the distant lights if there are any, and adds them to `samples`.
     ///
     /// The estimate is the *sum* of `f / pdf` over the samples: `pdf` and `pdf_area` are expected densities, the expected
     /// number of samples per measure, and `pmf` is the expected number on that triangle. Nothing is allocated but by
@@ -226,6 +256,8 @@ impl<'a> PointSampler<'a> {
         samples.extend(mixed.sample_feature(&self.at, numbers, |drawn, view| light_sample(&self.at, drawn, view)));
         let last = last - 1;
         samples.extend(self.sample_environment(mixed, [variate(last, 1), variate(last, 2)]));
+        let last = last - 1;
+        samples.extend(self.sample_distant(mixed, &mut variate(last, 0), [variate(last, 1), variate(last, 2)]));
     }
 
     /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a point of a triangle, for
@@ -256,7 +288,8 @@ impl<'a> PointSampler<'a> {
         let mixture = self.mixture();
         let mixed = mixture.side_by_side(splitting);
         let triangles = self.direction_density(direction, None, &mixed);
-        to_finite(triangles + self.environment_density(direction, &mixed))
+        let distant = self.distant_density(direction, None, &mixed);
+        to_finite(triangles + self.environment_density(direction, &mixed) + distant)
     }
 
     fn pdf_of_hit(&self, hit: &Hit, mixed: &Mixed<'_>) -> f32 {
@@ -267,6 +300,9 @@ impl<'a> PointSampler<'a> {
     }
 
     fn pdf_of_lamp(&self, light: LightId, direction: Vec3, mixed: &Mixed<'_>) -> f32 {
+        if let Some(light) = self.at.scene.lights.extras().distant_of(light) {
+            return to_finite(mixed.distant_density(&self.at, light, direction));
+        }
         let Some(point) = self.at.scene.lights.point_of_lamp(light, direction) else { return 0.0 };
         let view = &self.at.view(point.leaf);
         let Some(view) = view else { return 0.0 };
@@ -280,6 +316,22 @@ impl<'a> PointSampler<'a> {
         }
         let unit = direction.as_dvec3().normalize_or_zero().as_vec3();
         if unit == Vec3::ZERO { 0.0 } else { mixed.sky_density(&self.at, unit) }
+    }
+
+    /// Sum of the densities of a direction by the distant lights that it leads to, except one.
+    #[inline(always)]
+    fn distant_density(&self, direction: Vec3, except: Option<LightId>, mixed: &Mixed<'_>) -> f64 {
+        if self.at.scene.lights.extras().is_empty() { 0.0 } else { self.sum_of_distant(direction, except, mixed) }
+    }
+
+    #[inline(never)]
+    fn sum_of_distant(&self, direction: Vec3, except: Option<LightId>, mixed: &Mixed<'_>) -> f64 {
+        let extras = self.at.scene.lights.extras();
+        let unit = direction.as_dvec3().normalize_or_zero();
+        let except = except.and_then(|id| extras.distant_of(id));
+        let lights = extras.distants().iter().enumerate();
+        let met = lights.filter(|(light, record)| Some(*light) != except && record.holds(unit));
+        met.map(|(light, _)| mixed.distant_density(&self.at, light, unit.as_vec3())).sum()
     }
 
     /// Sum of the densities of all points along a ray, except those of one light.

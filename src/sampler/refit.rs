@@ -38,8 +38,9 @@ impl LightSampler {
     ///
     /// # Errors
     ///
-    /// If there is no such light, [`add_light`](crate::LightSamplerBuilder::add_light) would refuse the new one, or it emits
-    /// and the light that was added emitted nothing.
+    /// If there is no such light, [`add_light`](crate::LightSamplerBuilder::add_light) would refuse the new one, it emits
+    /// and the light that was added emitted nothing, or one of both is a [`DistantLight`](crate::DistantLight) and the other is
+    /// not.
     pub fn refit_lights(&mut self, updates: &[(LightId, Lamp)]) -> Result<(), Error> {
         self.lights.update_lamps(updates)?;
         self.fit();

@@ -1,5 +1,6 @@
 //! The techniques at one shading point: how often each is used, and the density of all together.
 
+use super::distant::{Distant, DistantDirection};
 use super::features::VisibleFeatures;
 use super::sky::{Sky, SkyDirection};
 use super::trees::{self, Trees};
@@ -27,12 +28,17 @@ const LEAST_TREES_CLOSE: f32 = 0.2;
 /// Largest estimate of an irradiance, so that sums of two stay finite. Proved: twice this is below `f32::MAX`.
 const MAX_IRRADIANCE: f32 = 1e35;
 
-/// Least probability of the environment next to the lights, and of the lights next to the environment. Estimates know of no
-/// walls: the environment may be all but hidden where a lamp is not, and a lamp where the environment is not.
+/// Least probability of the environment next to the lights, and of the lights next to the environment; and of distant lights
+/// next to both. Estimates know of no walls: the environment may be all but hidden where a lamp is not, and a lamp where the environment is not.
 ///
 /// Measured on the host bench's street (docs/CONSTANTS.md). A larger value wastes samples where one of both outshines the
 /// other; with a smaller one, what is dark by the estimates alone is noisier, by the inverse of this.
 const LEAST_BESIDE: f64 = 0.1;
+
+/// Probability of one of two techniques that do not know each other's walls, by estimates of the irradiance from both.
+fn share_beside(own: f64, others: f64) -> f64 {
+    if others > 0.0 { LEAST_BESIDE + (1.0 - 2.0 * LEAST_BESIDE) * (own / (own + others)) } else { 1.0 }
+}
 
 /// The techniques at one shading point, as far as they have been found out once for all questions.
 #[derive(Debug)]
@@ -45,6 +51,8 @@ pub(crate) struct Mixture {
     rest: f32,
     /// The environment, if it is a light and anything can arrive from it.
     sky: Option<Sky>,
+    /// The distant lights, if anything can arrive from them.
+    distant: Option<Distant>,
     shares: Shares,
     /// Whether all of this is known, and not only that there are trees.
     is_complete: bool,
@@ -59,6 +67,8 @@ struct Shares {
     features: f64,
     /// Probability of the environment as a light.
     sky: f64,
+    /// Probability of the distant lights.
+    distant: f64,
 }
 
 /// A point on a light with its density by all techniques together.
@@ -89,16 +99,21 @@ impl Mixture {
         if at.scene.has_features() {
             self.add_features(at);
         }
-        if let Some(regions) = at.scene.sky {
+        let extras = at.scene.lights.extras();
+        let receives_sky = extras.is_empty() || extras.groups_of_environment() & at.x.groups != 0;
+        if let Some(regions) = at.scene.sky.filter(|_| receives_sky) {
             self.add_sky(at, regions);
+        }
+        if !extras.is_empty() && !extras.distants().is_empty() {
+            self.add_distant(at);
         }
     }
 
     /// The trees alone.
     #[inline(always)]
     pub(crate) fn of_trees() -> Self {
-        let shares = Shares { trees: 1.0, features: 0.0, sky: 0.0 };
-        Self { first: None, features: None, rest: 1.0, sky: None, shares, is_complete: false }
+        let shares = Shares { trees: 1.0, features: 0.0, sky: 0.0, distant: 0.0 };
+        Self { first: None, features: None, rest: 1.0, sky: None, distant: None, shares, is_complete: false }
     }
 
     /// Looks for features, and balances them with the trees. In place: the list of features is large, and most of it is
@@ -117,7 +132,7 @@ impl Mixture {
         let rest = trees::irradiance(at, self.first.as_ref());
         self.rest = if rest > 0.0 { rest.max(least * seen).min(MAX_IRRADIANCE) } else { 0.0 };
         let total = f64::from(seen) + f64::from(self.rest);
-        self.shares = Shares { trees: f64::from(self.rest) / total, features: 1.0 / total, sky: 0.0 };
+        self.shares = Shares { trees: f64::from(self.rest) / total, features: 1.0 / total, sky: 0.0, distant: 0.0 };
     }
 
     /// Balances all that lights send with what the environment sends as a light.
@@ -125,21 +140,38 @@ impl Mixture {
     fn add_sky(&mut self, at: &Viewpoint<'_>, regions: &RegionMoments) {
         self.sky = Sky::new(at, regions);
         let Some(sky) = &self.sky else { return };
-        let lights = match &self.features {
+        let irradiance = f64::from(sky.irradiance());
+        let share = share_beside(irradiance, self.irradiance_of_lights(at));
+        let Shares { trees, features, .. } = self.shares;
+        let (trees, features) = ((1.0 - share) * trees, (1.0 - share) * features);
+        self.shares = Shares { trees, features, sky: share, distant: 0.0 };
+    }
+
+    /// Estimates the irradiance from all lights that are somewhere.
+    #[inline(always)]
+    fn irradiance_of_lights(&mut self, at: &Viewpoint<'_>) -> f64 {
+        match &self.features {
             Some(features) => features.total() + f64::from(self.rest),
             None => {
-                self.first = at.scene.tlas.first_weights(at);
+                if self.first.is_none() {
+                    self.first = at.scene.tlas.first_weights(at);
+                }
                 f64::from(trees::irradiance(at, self.first.as_ref()).min(MAX_IRRADIANCE))
             }
-        };
-        let share = if lights > 0.0 {
-            let of_all = f64::from(sky.irradiance()) / (f64::from(sky.irradiance()) + lights);
-            LEAST_BESIDE + (1.0 - 2.0 * LEAST_BESIDE) * of_all
-        } else {
-            1.0
-        };
-        let Shares { trees, features, .. } = self.shares;
-        self.shares = Shares { trees: (1.0 - share) * trees, features: (1.0 - share) * features, sky: share };
+        }
+    }
+
+    /// Balances all that lights and the environment send with what distant lights send.
+    #[inline(never)]
+    fn add_distant(&mut self, at: &Viewpoint<'_>) {
+        self.distant = Distant::new(at);
+        let Some(distant) = &self.distant else { return };
+        let irradiance = f64::from(distant.irradiance().min(MAX_IRRADIANCE));
+        let sky = self.sky.as_ref().map_or(0.0, |sky| f64::from(sky.irradiance()));
+        let share = share_beside(irradiance, sky + self.irradiance_of_lights(at));
+        let Shares { trees, features, sky, .. } = self.shares;
+        let [trees, features, sky] = [trees, features, sky].map(|other| (1.0 - share) * other);
+        self.shares = Shares { trees, features, sky, distant: share };
     }
 
     /// Returns the mixture for single samples: one technique is chosen.
@@ -153,7 +185,7 @@ impl Mixture {
     pub(crate) fn side_by_side<'m>(&'m self, splitting: &'m Splitting) -> Mixed<'m> {
         let features = self.features.as_ref().map_or(0.0, |features| 1.0 / features.total());
         let trees = Trees { first: self.first.as_ref(), splitting: Some(splitting) };
-        Mixed { trees, mixture: self, shares: Shares { trees: 1.0, features, sky: 1.0 } }
+        Mixed { trees, mixture: self, shares: Shares { trees: 1.0, features, sky: 1.0, distant: 1.0 } }
     }
 
     /// Estimates the irradiance from everything, as if there were no walls. Zero only where nothing can arrive.
@@ -161,7 +193,8 @@ impl Mixture {
         let first = self.first.or_else(|| at.scene.tlas.first_weights(at));
         let features = self.features.as_ref().map_or(0.0, VisibleFeatures::irradiance);
         let sky = self.sky.as_ref().map_or(0.0, Sky::irradiance);
-        trees::irradiance(at, first.as_ref()) + features + sky
+        let distant = self.distant.as_ref().map_or(0.0, Distant::irradiance);
+        trees::irradiance(at, first.as_ref()) + features + sky + distant
     }
 }
 
@@ -174,11 +207,48 @@ pub(crate) struct Mixed<'m> {
 }
 
 impl Mixed<'_> {
-    /// Chooses between the environment as a light and the lights. Returns whether it is the environment.
+    /// Chooses between the environment as a light and the lights that are somewhere. Returns whether it is the environment.
     #[inline(always)]
     pub(crate) fn chooses_sky(&self, choice: &mut Variate) -> bool {
-        let share = self.shares.sky as f32;
-        self.mixture.sky.is_some() && pick_pair([share, 1.0 - share], choice) == 0
+        if self.mixture.sky.is_none() {
+            return false;
+        }
+        let Shares { sky, distant, .. } = self.shares;
+        let share = if distant == 0.0 { sky } else { sky / (1.0 - distant) } as f32;
+        pick_pair([share, 1.0 - share], choice) == 0
+    }
+
+    /// Chooses between distant lights and all else. Returns whether it is a distant light. Asked before all other choices.
+    #[inline(always)]
+    pub(crate) fn chooses_distant(&self, choice: &mut Variate) -> bool {
+        if self.mixture.distant.is_none() {
+            return false;
+        }
+        let share = self.shares.distant as f32;
+        pick_pair([share, 1.0 - share], choice) == 0
+    }
+
+    /// Draws a direction of a distant light, if anything can arrive from any.
+    #[inline(never)]
+    pub(crate) fn sample_distant(
+        &self,
+        at: &Viewpoint<'_>,
+        choice: &mut Variate,
+        u: [Variate; 2],
+    ) -> Option<DistantDirection> {
+        let drawn = self.mixture.distant.as_ref()?.sample(at, choice, u)?;
+        let share = self.shares.distant;
+        Some(DistantDirection { pmf: share * drawn.pmf, pdf: share * drawn.pdf, ..drawn })
+    }
+
+    /// Returns the probability of a distant light by its place among them, or the expected number of directions.
+    pub(crate) fn distant_pmf(&self, at: &Viewpoint<'_>, light: usize) -> f64 {
+        self.mixture.distant.as_ref().map_or(0.0, |distant| self.shares.distant * distant.pmf(at, light))
+    }
+
+    /// Returns the density of a unit direction that leads to a distant light with an extent, by that light alone.
+    pub(crate) fn distant_density(&self, at: &Viewpoint<'_>, light: usize, direction: Vec3) -> f64 {
+        self.mixture.distant.as_ref().map_or(0.0, |distant| self.shares.distant * distant.pdf(at, light, direction))
     }
 
     /// Probability of the environment as a light, or the expected number of directions.

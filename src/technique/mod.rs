@@ -3,11 +3,13 @@
 //! A [`Technique`] estimates the irradiance that it accounts for, draws a point on a light and knows the density of any
 //! point. [`Mixture`] chooses among the techniques in proportion to their estimates; a density is that of the mixture,
 //! whichever technique drew the point. There are two: the [trees](trees), and the [bright features](features) of the
-//! environment as the portals show them. A third one draws directions instead of points: the environment [itself](sky), where
-//! it is a light.
+//! environment as the portals show them. Two more draw directions instead of points: the environment [itself](sky), where
+//! it is a light, and [distant] lights.
 
+mod distant;
 mod features;
 mod mixture;
+mod segment;
 mod sky;
 mod trees;
 mod viewpoint;
@@ -17,7 +19,9 @@ use glam::DVec3;
 use crate::light::{LightPoint, LightView};
 use crate::warp::{Variate, seed};
 
+pub(crate) use distant::DistantDirection;
 pub(crate) use mixture::{Drawn, Mixed, Mixture};
+pub(crate) use segment::{Distances, MediumSegment};
 pub(crate) use sky::SkyDirection;
 pub(crate) use viewpoint::{LightScene, Viewpoint};
 

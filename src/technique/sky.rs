@@ -26,10 +26,6 @@ use crate::warp::{Variate, keep_positive};
 /// Larger: slower in these regions. Smaller: more samples below the horizon.
 const CUT_LEVELS: u32 = 2;
 
-/// Largest coordinate of a position at which anything arrives. *Format*: documented at
-/// [`ShadingPoint::position`](crate::ShadingPoint::position).
-const POSITION_LIMIT: f32 = 1e15;
-
 /// The environment as seen from one shading point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sky {
@@ -60,7 +56,7 @@ impl Sky {
     /// Weighs all regions. `None` if nothing can arrive. Inline, as what is returned otherwise is copied.
     #[inline(always)]
     pub(super) fn new(at: &Viewpoint<'_>, regions: &RegionMoments) -> Option<Self> {
-        if !at.x.position.abs().cmple(Vec3::splat(POSITION_LIMIT)).all() {
+        if !at.is_somewhere() {
             return None;
         }
         let environment = &at.scene.environment;

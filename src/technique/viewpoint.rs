@@ -1,5 +1,7 @@
 //! Everything that techniques draw from, and the same as seen from one shading point.
 
+use core::f64::consts::PI;
+
 use glam::Vec3;
 
 use crate::env::{EnvironmentView, RegionMoments};
@@ -31,7 +33,7 @@ impl<'a> LightScene<'a> {
     /// Whether there may be a technique besides the trees.
     #[inline]
     pub(crate) fn has_more_than_trees(&self) -> bool {
-        self.sky.is_some() || self.has_features()
+        self.sky.is_some() || self.has_features() || !self.lights.extras().is_empty()
     }
 
     /// The environment, if what portals show depends on the direction.
@@ -64,11 +66,40 @@ pub(crate) struct Viewpoint<'a> {
     pub(crate) x: ShadingPoint,
 }
 
+/// Largest coordinate of a position at which anything arrives. *Format*: documented at
+/// [`ShadingPoint::position`](crate::ShadingPoint::position).
+const POSITION_LIMIT: f32 = 1e15;
+
 impl Viewpoint<'_> {
+    /// Whether anything can arrive at the position at all.
+    #[inline]
+    pub(crate) fn is_somewhere(&self) -> bool {
+        self.x.position.abs().cmple(Vec3::splat(POSITION_LIMIT)).all()
+    }
+
     /// Returns a light as seen from here; `None` if nothing can arrive from it.
     #[inline]
     pub(crate) fn view(&self, leaf: u32) -> Option<LightView<'_>> {
+        if !self.receives(leaf) {
+            return None;
+        }
         self.scene.lights.view(leaf, &self.x, self.scene.directional_environment())
+    }
+
+    /// Estimates the irradiance from all that is infinitely far away and needs no portal: the same at all places.
+    pub(crate) fn irradiance_everywhere(&self) -> f64 {
+        let extras = self.scene.lights.extras();
+        let receives = |groups: u32| groups & self.x.groups != 0;
+        let distants = extras.distants().iter().filter(|light| receives(light.groups));
+        let distant: f64 = distants.map(|light| f64::from(light.weigh(self.x.receiver))).sum();
+        let is_lit = self.scene.sky.is_some() && receives(extras.groups_of_environment());
+        distant + if is_lit { 4.0 * PI * f64::from(self.scene.environment.mean()) } else { 0.0 }
+    }
+
+    /// Whether the shading point receives any of the light groups that a light is in.
+    #[inline(always)]
+    pub(crate) fn receives(&self, leaf: u32) -> bool {
+        self.scene.lights.extras().groups_of(leaf) & self.x.groups != 0
     }
 }
 
@@ -97,7 +128,7 @@ impl LeafOracle for Viewpoint<'_> {
 
     #[inline]
     fn is_visible(&self, leaf: u32) -> bool {
-        self.scene.lights.energy > 0.0 && self.scene.lights.light(leaf).is_visible(&self.x)
+        self.scene.lights.energy > 0.0 && self.receives(leaf) && self.scene.lights.light(leaf).is_visible(&self.x)
     }
 
     fn irradiance_per_area(&self, leaf: u32) -> f32 {

@@ -13,7 +13,11 @@ mod validate;
 mod walk;
 
 pub use arity::Arity;
-pub(crate) use build::build;
+#[cfg(test)]
+use build::build;
+pub(crate) use build::build_in_groups;
 pub(crate) use tree::{MAX_LEAVES, Tlas, TlasView};
 pub use walk::Splitting;
-pub(crate) use walk::{Beam, Descent, FirstWeights, INTERLEAVED, LeafOracle, Outgoing};
+pub(crate) use walk::{
+    Beam, ClusterAlong, ClusterMoments, Clusters, Descent, FirstWeights, INTERLEAVED, LeafOracle, Outgoing, Stretch,
+};

@@ -31,6 +31,8 @@ buffers! {
         spreads: Spread = b"SPRE" version 1,
         /// Parent of each leaf.
         leaves: Slot = b"LSLO" version 1,
+        /// Light groups that any light below each lane is in, by nodes. Empty if all lights are in all groups.
+        groups: u32 = b"NGRP" version 1,
     }
 }
 
@@ -41,6 +43,7 @@ pub(super) struct WideTree<'a, const N: usize> {
     pub(super) parents: &'a [Slot],
     pub(super) spreads: &'a [Spread],
     pub(super) leaves: &'a [Slot],
+    pub(super) groups: &'a [u32],
 }
 
 /// Evaluates an expression with the tree of a [`TlasView`] in its own arity.
@@ -67,7 +70,14 @@ pub(super) use for_arity;
 impl Tlas {
     /// Returns a tree without leaves.
     pub(super) fn empty(arity: Arity) -> Self {
-        Self { arity, nodes: Vec::new(), parents: Vec::new(), spreads: Vec::new(), leaves: Vec::new() }
+        Self {
+            arity,
+            nodes: Vec::new(),
+            parents: Vec::new(),
+            spreads: Vec::new(),
+            leaves: Vec::new(),
+            groups: Vec::new(),
+        }
     }
 }
 
@@ -81,6 +91,7 @@ impl<'a> TlasView<'a> {
             parents: self.parents,
             spreads: self.spreads,
             leaves: self.leaves,
+            groups: self.groups,
         }
     }
 }

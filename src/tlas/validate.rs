@@ -25,6 +25,9 @@ impl<const N: usize> WideTree<'_, N> {
     fn validate(&self) -> Result<(), Error> {
         Error::unless_equal("number of parents", self.parents.len(), self.nodes.len())?;
         Error::unless_equal("number of spreads", self.spreads.len(), self.nodes.len())?;
+        if !self.groups.is_empty() {
+            Error::unless_equal("number of light groups of nodes", self.groups.len(), self.nodes.len() * N)?;
+        }
         if self.nodes.is_empty() {
             Error::unless_equal("number of leaves without a node", self.leaves.len().min(2), self.leaves.len().min(1))?;
             return match self.leaves {

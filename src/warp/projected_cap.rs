@@ -5,6 +5,8 @@
 //! and the unit circle (after Peters and Dachsbacher 2019, "Sampling projected spherical caps in real time"). Across the
 //! ellipse, the coordinate is drawn as for the whole ellipse; along it, uniformly. The density is that of both: exactly the
 //! cosine's for a cap that is not cut, and near it for one that is. It changes gradually from the one to the other.
+//!
+//! A cap of more than a hemisphere projects to the unit disk without what the rest of the sphere projects to.
 
 use core::f32::consts::TAU;
 use core::f64::consts::FRAC_2_PI;
@@ -33,7 +35,7 @@ pub(crate) struct ProjectedCap {
     frame: [DVec3; 3],
     /// Sine and cosine of the angle between the axis and the normal.
     tilt: [f64; 2],
-    /// Sine and cosine of the cap's half angle, of up to a right angle.
+    /// Sine and cosine of the cap's half angle.
     half_angle: [f64; 2],
     /// Largest coordinate across the axis.
     width: f64,
@@ -42,16 +44,29 @@ pub(crate) struct ProjectedCap {
 /// What lies at one coordinate across the axis.
 struct Chord {
     start: f64,
+    /// Without the gap.
     length: f64,
+    /// What is left out: at this place, and of this length.
+    gap: [f64; 2],
     /// Density of the coordinate over the length.
     density: f64,
 }
 
+impl Chord {
+    const WITHOUT_GAP: [f64; 2] = [f64::INFINITY, 0.0];
+
+    /// Returns the coordinate at a share of the length.
+    fn at(&self, share: f64) -> f64 {
+        let place = self.start + share * self.length;
+        if place > self.gap[0] { place + self.gap[1] } else { place }
+    }
+}
+
 impl ProjectedCap {
-    /// Returns the part of a cap above the plane of a unit normal; `None` for a cap that is too narrow. A cap of more than a
-    /// hemisphere is taken for all directions above the plane.
+    /// Returns the part of a cap above the plane of a unit normal; `None` for a cap that is too narrow.
     pub(crate) fn new(cap: &SphericalCap, normal: DVec3) -> Option<Self> {
-        let (axis, half_angle) = if cap.cos < 0.0 { (normal, [1.0, 0.0]) } else { (cap.axis, [cap.sin, cap.cos]) };
+        let holds_all = cap.cos < 0.0 && (cap.sin == 0.0 || cap.axis.dot(normal) >= cap.sin);
+        let (axis, half_angle) = if holds_all { (normal, [1.0, 0.0]) } else { (cap.axis, [cap.sin, cap.cos]) };
         let cos = axis.dot(normal);
         let aside = axis - normal * cos;
         let sin = math::sqrt64(aside.length_squared());
@@ -60,7 +75,7 @@ impl ProjectedCap {
         let [sine, cosine] = half_angle;
         // The root of one less the squared share of the width at which the rim meets the plane.
         let end = if cos < 0.0 { -cos * cosine / (sin * sine) } else { 0.0 };
-        let width = sine * math::sqrt64((1.0 - end * end).max(0.0));
+        let width = if cosine < 0.0 { 1.0 } else { sine * math::sqrt64((1.0 - end * end).max(0.0)) };
         let is_resolved = width > LEAST_SINE;
         is_resolved.then(|| Self { frame: [along, normal.cross(along), normal], tilt: [sin, cos], half_angle, width })
     }
@@ -73,11 +88,27 @@ impl ProjectedCap {
         // Half of the ellipse's chord is this times its half axis.
         let root = math::sqrt64((1.0 - (y / sine) * (y / sine)).max(0.0));
         let (middle, half) = (cosine * sin, sine * cos * root);
+        if cosine < 0.0 {
+            let edge = math::sqrt64(1.0 - y * y);
+            // Both points of the rim, and whether they are above the plane.
+            let (near, far) = (middle - half, middle + half);
+            let [near_height, far_height] = [root, -root].map(|root| cosine * cos + sine * sin * root);
+            let (start, gap) = if root > 0.0 && far_height > 0.0 {
+                (-edge, [far, near - far])
+            } else if root > 0.0 && near_height > 0.0 {
+                (near, Chord::WITHOUT_GAP)
+            } else {
+                (-edge, Chord::WITHOUT_GAP)
+            };
+            let length = (edge - start - gap[1]).max(END);
+            return Chord { start, length, gap, density: across / length };
+        }
+        let gap = Chord::WITHOUT_GAP;
         if cosine * cos >= sine * sin * root {
-            return Chord { start: middle - half, length: 2.0 * half, density: 0.5 / (sine * cos) };
+            return Chord { start: middle - half, length: 2.0 * half, gap, density: 0.5 / (sine * cos) };
         }
         let length = math::sqrt64(1.0 - y * y) - (middle - half);
-        Chord { start: middle - half, length, density: across / length }
+        Chord { start: middle - half, length, gap, density: across / length }
     }
 
     /// Maps `u` in `[0, 1]²` to a direction.
@@ -88,7 +119,7 @@ impl ProjectedCap {
         let share = (radius * f64::from(sin)).clamp(END - 1.0, 1.0 - END);
         let place = 0.5 + 0.5 * radius * f64::from(cos) / math::sqrt64(1.0 - share * share);
         let chord = self.chord(share);
-        let (x, y) = (chord.start + place.clamp(0.0, 1.0) * chord.length, self.width * share);
+        let (x, y) = (chord.at(place.clamp(0.0, 1.0)), self.width * share);
         let [along, across, normal] = self.frame;
         along * x + across * y + normal * math::sqrt64((1.0 - x * x - y * y).max(0.0))
     }
@@ -156,6 +187,21 @@ mod tests {
                 before = deviation;
             }
             before = 0.0;
+        }
+    }
+
+    #[test]
+    fn caps_of_more_than_a_hemisphere_are_covered() {
+        for angle in [1.58f64, 1.8, 2.2, 2.8, 3.1] {
+            for step in 0..=30 {
+                let tilt = f64::from(step) * 6.0f64.to_radians();
+                let axis = DVec3::new(tilt.sin() * 0.6, tilt.sin() * 0.8, tilt.cos());
+                let cap = SphericalCap { axis, sin: angle.sin(), cos: angle.cos() };
+                let Some([mean, exact, deviation]) = measure(&cap) else { panic!("{angle} {step}") };
+                assert!((mean - exact).abs() < 0.01 * exact + 1e-3, "{angle} {step}: {mean} {exact}");
+                // A thin ring at the horizon is hardly lit.
+                assert!(deviation < 0.7 || exact < 0.5, "{angle} {step}: {deviation}");
+            }
         }
     }
 }

@@ -9,13 +9,20 @@ use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Scene, random_point};
+use crate::groups::scene as grouped;
 use crate::kinds::{mixed, pdf_again};
-use fanlight::{LightSample, LightSampler, MeshId, ShadingPoint, Splitting, TriangleId};
+use fanlight::{LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId};
+use glam::Vec3;
 
 const SCENES: usize = 70;
 const POINTS: usize = 60;
 /// Scenes that mix all kinds of lights.
 const KINDS: usize = 12;
+/// Scenes with light groups, profiles and distant lights.
+const GROUPS: usize = 6;
+
+/// End of the scenes that mix all kinds.
+const LAST_KIND: usize = SCENES + KINDS;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// The same scenes at points with lobes.
@@ -120,6 +127,35 @@ fn line_of_kinds(number: usize) -> String {
     format!("{number:2} kinds {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene with light groups, profiles and distant lights, and about distances along rays in it.
+fn line_of_groups(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let (lights, _) = grouped(number, &mut pcg);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    let emission = lights.emission().within(Vec3::ONE, 4.0);
+    for i in 0..POINTS {
+        let x = random_point(&mut pcg, i).with_groups([1, 6, u32::MAX][i % 3]);
+        let at = lights.at(&x);
+        if let Some(sample) = at.sample(pcg.cube()) {
+            drawn += 1;
+            let id = sample.light.id().map_or(u32::MAX, |id| id.index());
+            hash.add(&[f32::from_bits(id), sample.distance, sample.pdf, sample.pdf_area, sample.pmf]);
+            [sample.position, sample.normal, sample.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[pdf_again(&at, &sample), at.pdf_direction(sample.direction), at.pdf_sample_direction(&sample)]);
+        }
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            [ray.position, ray.normal, ray.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[ray.pdf, ray.pmf, emission.pdf_ray(x.position, pcg.direction())]);
+        }
+        let segment = RaySegment::new(x.position, pcg.direction(), 1.0 + pcg.f32(), [0.0, 0.5][i % 2]);
+        let along = lights.along(&segment.with_groups(x.groups));
+        if let Some(sample) = along.sample([pcg.f32(), pcg.f32(), pcg.f32(), pcg.f32()]) {
+            hash.add(&[sample.distance, sample.pdf_distance, sample.light.pdf, along.pdf_distance(0.5)]);
+        }
+    }
+    format!("{number:2} groups {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -132,9 +168,13 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let kinds = if has_lobes { 0 } else { KINDS };
-    let line = |i| if i < SCENES { line(i, has_lobes) } else { line_of_kinds(i - SCENES) };
-    let found = parallel::map(SCENES + kinds, line).concat();
+    let more = if has_lobes { 0 } else { KINDS + GROUPS };
+    let line = |i| match i {
+        0..SCENES => line(i, has_lobes),
+        SCENES..LAST_KIND => line_of_kinds(i - SCENES),
+        _ => line_of_groups(i - LAST_KIND),
+    };
+    let found = parallel::map(SCENES + more, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {
         std::fs::write(&path, found).expect("the list can be written");
         panic!("{} is written, and nothing was compared", path.display());

@@ -3,7 +3,7 @@
 
 pub(crate) use fanlight::{Filter, Illumination, Wrap};
 
-use fanlight::{Emission, Hit, LightSampler, Mesh, MeshId, PointSampler, ShadingPoint, Sides, TriangleId};
+use fanlight::{Emission, Hit, LightSampler, Mesh, MeshId, PointSampler, RaySegment, ShadingPoint, Sides, TriangleId};
 use glam::Vec3;
 
 use super::Error;
@@ -88,6 +88,19 @@ impl Lights {
     /// The lights as seen from a point in fog.
     pub(crate) fn at_volume(&self, position: Vec3) -> LightsAt<'_> {
         LightsAt(self.sampler.at(&ShadingPoint::volume(position)))
+    }
+
+    /// A distance along a stretch of a ray in fog of this density, by the light that is expected there, and its density per
+    /// length.
+    pub(crate) fn propose_distance(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        length: f32,
+        density: f32,
+        u: f32,
+    ) -> Option<(f32, f32)> {
+        self.sampler.along(&RaySegment::new(origin, direction, length, density)).sample_distance(u)
     }
 
     /// One direction to a light and its density, for a point of a surface.

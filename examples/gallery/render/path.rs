@@ -75,13 +75,18 @@ impl<'a> PathTracer<'a> {
     fn scattered_by_fog(&self, origin: Vec3, direction: Vec3, distance: f32, random: &mut Random) -> Vec3 {
         let Some(fog) = self.world.fog else { return Vec3::ZERO };
         let [enter, leave] = fog.span(origin, direction, distance);
-        // In proportion to the fog that is seen through the fog before it.
+        // By the lights, or in proportion to the fog that is seen through the fog before it.
         let share = 1.0 - (-fog.density * (leave - enter)).exp();
-        let distance = enter - (1.0 - random.one() * share).ln() / fog.density;
+        let (start, u) = (origin + enter * direction, random.one());
+        let (distance, weight) = match self.techniques.distance_in_fog(start, direction, leave - enter, fog.density, u)
+        {
+            Some((beyond, pdf)) => (enter + beyond, fog.density * (-fog.density * beyond).exp() / pdf),
+            None => (enter - (1.0 - u * share).ln() / fog.density, share),
+        };
         let position = origin + distance * direction;
         let lights = self.techniques.lights_in_fog(position);
         let x = Vertex { place: Place::Fog(position), lights, guide: None, arrival: None };
-        share * (self.by_light_samples(&x, random) + self.by_phase_sample(&x, random))
+        weight * (self.by_light_samples(&x, random) + self.by_phase_sample(&x, random))
     }
 
     /// The vertex of that number, at a point that a ray of that direction has met.

@@ -87,6 +87,22 @@ impl Techniques {
         }
     }
 
+    /// A distance along a stretch of a ray in fog by the lights, and its density per length; `None` where only the fog itself
+    /// chooses.
+    pub(crate) fn distance_in_fog(
+        &self,
+        origin: glam::Vec3,
+        direction: glam::Vec3,
+        length: f32,
+        density: f32,
+        u: f32,
+    ) -> Option<(f32, f32)> {
+        match &self.choice {
+            LightChoice::Fanlight => self.lights.propose_distance(origin, direction, length, density, u),
+            _ => None,
+        }
+    }
+
     /// The paper that paths are led to, as seen from a point of a surface.
     pub(crate) fn guide_at(&self, point: &Point, bsdf: &Bsdf) -> Option<LightsAt<'_>> {
         self.guide.as_ref().filter(|_| !bsdf.transmits()).map(|guide| guide.at(point.position, bsdf))

@@ -11,6 +11,7 @@ use super::{
 use crate::geometry::{Aabb, Cone};
 use crate::light::Sides;
 use crate::light::emitted::{EmittedRay, cosine_ray, per_direction};
+use crate::light::profile::Profiles;
 use crate::math;
 use crate::receiver::{Receiver, ShadingPoint};
 use crate::warp::Variate;
@@ -82,11 +83,11 @@ impl LampKind for DiskLight {
         self.radiance
     }
 
-    fn area(&self) -> f32 {
+    fn area(&self, _profiles: Profiles<'_>) -> f32 {
         self.surface()
     }
 
-    fn reach(&self) -> Reach {
+    fn reach(&self, _profiles: Profiles<'_>) -> Reach {
         let half = self.normal.to_array().map(|n| self.radius * math::sqrt((1.0 - n * n).max(0.0)));
         // Rounding of the normal leaves a little more.
         let half = Vec3::from_array(half) + 1e-6 * self.radius;
@@ -101,7 +102,7 @@ impl LampKind for DiskLight {
         }
     }
 
-    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+    fn view(&self, x: &ShadingPoint, _profiles: Profiles<'_>) -> Option<ShapeView> {
         let (center, normal) = (self.center.as_dvec3() - x.position.as_dvec3(), self.exact_normal());
         let side = -normal.dot(center);
         let is_seen = side > 0.0 || (side < 0.0 && self.two_sided);
@@ -117,7 +118,7 @@ impl LampKind for DiskLight {
         is_seen && distance > 0.0 && (distance * direction - center).length_squared() <= radius2
     }
 
-    fn emit(&self, point: [Variate; 2], direction: [Variate; 2], side: f64) -> EmittedRay {
+    fn emit(&self, point: [Variate; 2], direction: [Variate; 2], side: f64, _profiles: Profiles<'_>) -> EmittedRay {
         let [u1, u2] = point.map(|u| u.value());
         let (sin, cos) = math::sin_cos(core::f32::consts::TAU * u2 as f32);
         let (s, t) = self.exact_normal().any_orthonormal_pair();
@@ -127,7 +128,7 @@ impl LampKind for DiskLight {
         cosine_ray(position, self.normal, self.two_sided && side < 0.5, direction, pdf)
     }
 
-    fn emission_pdf(&self, direction: Vec3) -> f64 {
+    fn emission_pdf(&self, direction: Vec3, _profiles: Profiles<'_>) -> f64 {
         let leaves = self.two_sided || self.normal.dot(direction) > 0.0;
         if leaves { per_direction(self.two_sided) / f64::from(self.surface()) } else { 0.0 }
     }

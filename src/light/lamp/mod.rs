@@ -5,7 +5,9 @@
 //! every density is that of the rounded direction.
 
 mod disk;
+mod distant;
 mod point;
+mod profiled;
 mod sphere;
 mod spot;
 mod tube;
@@ -16,6 +18,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 use super::emitted::EmittedRay;
+use super::extras::Extras;
+use super::profile::Profiles;
 use super::triangle_view::FARTHEST_POINT;
 use super::{DrawnPoint, LightKind, LightTriangle, LightViewKind, LocalPoint, POSITION_LIMIT};
 use crate::blas;
@@ -30,8 +34,10 @@ use crate::warp::spherical_cap::SphericalCap;
 
 pub use disk::DiskLight;
 use disk::DiskView;
+pub use distant::DistantLight;
 pub use point::PointLight;
 use point::PointView;
+pub use profiled::ProfileLight;
 pub use sphere::SphereLight;
 use sphere::SphereView;
 pub use spot::SpotLight;
@@ -79,6 +85,10 @@ pub enum Lamp {
     Disk(DiskLight),
     /// The round surface of a cylinder.
     Tube(TubeLight),
+    /// A direction, or a cap of directions, infinitely far away.
+    Distant(DistantLight),
+    /// A point without an extent that sends by a profile.
+    Profile(ProfileLight),
 }
 
 /// What is kept of every lamp that can emit light: in the same array as triangles, and as large as they are.
@@ -100,7 +110,7 @@ const _: () = assert!(
 
 /// A number that a lamp must not have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct LampFault {
+pub(super) struct LampFault {
     what: &'static str,
     value: f32,
     expected: &'static str,
@@ -143,22 +153,22 @@ trait LampKind: Sized {
     fn weight(&self) -> f32;
 
     /// Returns what the weight is multiplied by so that it competes with the radiance times area of a triangle.
-    fn area(&self) -> f32;
+    fn area(&self, profiles: Profiles<'_>) -> f32;
 
     /// Returns where the lamp is and which way it sends.
-    fn reach(&self) -> Reach;
+    fn reach(&self, profiles: Profiles<'_>) -> Reach;
 
     /// Returns the lamp as seen from a shading point; `None` where nothing can arrive, whatever the receiver.
-    fn view(&self, x: &ShadingPoint) -> Option<ShapeView>;
+    fn view(&self, x: &ShadingPoint, profiles: Profiles<'_>) -> Option<ShapeView>;
 
     /// Whether a ray in a unit direction meets a side that shines back along it.
     fn is_crossed(&self, origin: Vec3, direction: DVec3) -> bool;
 
     /// Draws a ray in which light leaves. `side` is uniform in `[0, 1)`.
-    fn emit(&self, point: [Variate; 2], direction: [Variate; 2], side: f64) -> EmittedRay;
+    fn emit(&self, point: [Variate; 2], direction: [Variate; 2], side: f64, profiles: Profiles<'_>) -> EmittedRay;
 
     /// Returns the density with which [`Self::emit`] draws a ray in a unit direction.
-    fn emission_pdf(&self, direction: Vec3) -> f64;
+    fn emission_pdf(&self, direction: Vec3, profiles: Profiles<'_>) -> f64;
 }
 
 /// What a kind of lamp says of itself to a shading point.
@@ -217,6 +227,8 @@ macro_rules! of_lamp {
             Lamp::Spot($kind) => $call,
             Lamp::Disk($kind) => $call,
             Lamp::Tube($kind) => $call,
+            Lamp::Distant($kind) => $call,
+            Lamp::Profile($kind) => $call,
         }
     };
 }
@@ -240,13 +252,18 @@ impl Lamp {
     ///
     /// If a number is not finite or out of its range.
     pub(crate) fn record(self, number: u32) -> Result<LampRecord, Error> {
-        let (kind, values) = of_lamp!(self, kind => {
-            kind.check().map_err(|LampFault { what, value, expected }| {
-                Error(ErrorKind::Lamp { light: number as usize, what, value, expected })
-            })?;
-            (code_of(&kind), kind.to_values())
-        });
+        self.check().map_err(|LampFault { what, value, expected }| {
+            Error(ErrorKind::Lamp { light: number as usize, what, value, expected })
+        })?;
+        let (kind, values) = of_lamp!(self, kind => (code_of(&kind), kind.to_values()));
         Ok(LampRecord { values, kind, number_and_mark: number | LightTriangle::LAMP })
+    }
+}
+
+impl Lamp {
+    /// Checks the numbers.
+    pub(super) fn check(&self) -> Result<(), LampFault> {
+        of_lamp!(self, kind => kind.check())
     }
 }
 
@@ -264,6 +281,8 @@ impl LampRecord {
             SpotLight::CODE => Lamp::Spot(SpotLight::from_values(self.values)),
             DiskLight::CODE => Lamp::Disk(DiskLight::from_values(self.values)),
             TubeLight::CODE => Lamp::Tube(TubeLight::from_values(self.values)),
+            DistantLight::CODE => Lamp::Distant(DistantLight::from_values(self.values)),
+            ProfileLight::CODE => Lamp::Profile(ProfileLight::from_values(self.values)),
             _ => return None,
         })
     }
@@ -285,7 +304,15 @@ impl LampRecord {
 
     /// Whether the numbers, which may come from outside, are those of a lamp.
     pub(super) fn is_valid(&self) -> bool {
-        self.decode().is_some_and(|lamp| of_lamp!(lamp, kind => kind.check().is_ok()))
+        self.decode().is_some_and(|lamp| lamp.check().is_ok() && !matches!(lamp, Lamp::Distant(_)))
+    }
+
+    /// Returns the light as one that is infinitely far away; `None` for any other.
+    pub(super) fn distant(&self) -> Option<DistantLight> {
+        match self.lamp() {
+            Lamp::Distant(light) => Some(light),
+            _ => None,
+        }
     }
 
     /// Whether the lamp has an extent.
@@ -299,37 +326,58 @@ impl LampRecord {
         if self.has_extent() { SampledLight::Shape(id) } else { SampledLight::Punctual(id) }
     }
 
+    /// Returns radiance or radiant intensity.
+    pub(super) fn weight(&self) -> f32 {
+        of_lamp!(self.lamp(), kind => kind.weight())
+    }
+
+    /// Returns the number of the lamp's profile; `None` for a lamp without one.
+    pub(super) fn profile(&self) -> Option<u32> {
+        match self.lamp() {
+            Lamp::Profile(light) => Some(light.profile().index()),
+            _ => None,
+        }
+    }
+}
+
+/// A lamp together with what it may refer to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LampLight<'a> {
+    pub(super) record: &'a LampRecord,
+    pub(super) extras: Extras<'a>,
+}
+
+impl LampLight<'_> {
     /// Draws a ray in which light leaves.
     pub(super) fn emit(&self, point: [Variate; 2], direction: [Variate; 2], side: f64) -> EmittedRay {
-        of_lamp!(self.lamp(), kind => kind.emit(point, direction, side))
+        of_lamp!(self.record.lamp(), kind => kind.emit(point, direction, side, self.extras.profiles()))
     }
 
     /// Returns the density with which [`Self::emit`] draws a ray in a unit direction.
     pub(super) fn emission_pdf(&self, direction: Vec3) -> f64 {
-        of_lamp!(self.lamp(), kind => kind.emission_pdf(direction))
+        of_lamp!(self.record.lamp(), kind => kind.emission_pdf(direction, self.extras.profiles()))
     }
 }
 
-impl LightKind for LampRecord {
+impl LightKind for LampLight<'_> {
     fn is_portal(&self) -> bool {
         false
     }
 
     fn is_two_sided(&self) -> bool {
-        of_lamp!(self.lamp(), kind => kind.reach().two_sided)
+        of_lamp!(self.record.lamp(), kind => kind.reach(self.extras.profiles()).two_sided)
     }
 
     fn weight(&self) -> f32 {
-        of_lamp!(self.lamp(), kind => kind.weight())
+        self.record.weight()
     }
 
     fn area(&self) -> f32 {
-        of_lamp!(self.lamp(), kind => kind.area())
+        of_lamp!(self.record.lamp(), kind => kind.area(self.extras.profiles()))
     }
 
     fn bounds(&self, _directional: bool, energy: impl FnOnce(f32) -> f32) -> (LightBounds, Moments) {
-        let (Reach { aabb, normals, emission, two_sided, mean, variance, normal }, area) =
-            of_lamp!(self.lamp(), kind => (kind.reach(), kind.area()));
+        let (Reach { aabb, normals, emission, two_sided, mean, variance, normal }, area) = of_lamp!(self.record.lamp(), kind => (kind.reach(self.extras.profiles()), kind.area(self.extras.profiles())));
         let energy = energy(area);
         let bounds = LightBounds { aabb, normals, emission, flux: energy, portal: 0.0, two_sided };
         (bounds, Moments { energy, mean, variance, normal })
@@ -348,7 +396,7 @@ impl LightKind for LampRecord {
     #[inline(never)]
     fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         let unit = direction.as_dvec3().try_normalize()?;
-        let is_crossed = of_lamp!(self.lamp(), kind => kind.is_crossed(origin, unit));
+        let is_crossed = of_lamp!(self.record.lamp(), kind => kind.is_crossed(origin, unit));
         // A sample's own direction stays as it is: next to a rim, another rounding would have another density.
         let is_unit = (direction.as_dvec3().length_squared() - 1.0).abs() <= UNIT_ROUNDING;
         is_crossed.then(|| LocalPoint::from_direction(if is_unit { direction } else { unit.as_vec3() }))
@@ -358,12 +406,12 @@ impl LightKind for LampRecord {
 impl LampView {
     /// Returns the view from a shading point, or `None` where nothing can arrive.
     #[inline(never)]
-    pub(super) fn new(lamp: &LampRecord, x: &ShadingPoint) -> Option<Self> {
+    pub(super) fn new(lamp: &LampLight<'_>, x: &ShadingPoint) -> Option<Self> {
         // NaN fails.
         if !x.position.to_array().iter().all(|x| x.abs() <= FARTHEST_POINT) {
             return None;
         }
-        let shape = of_lamp!(lamp.lamp(), kind => kind.view(x))?;
+        let shape = of_lamp!(lamp.record.lamp(), kind => kind.view(x, lamp.extras.profiles()))?;
         let is_below = x.receiver.has_horizon() && {
             let [height, size] = of_view!(&shape, view => view.highest(x.receiver.normal().as_dvec3()));
             height < f64::from(-HORIZON_ROUNDING) * size
@@ -425,7 +473,7 @@ impl LightViewKind for LampView {
 }
 
 /// Estimates the irradiance from a cap of unit radiance. Zero only if nothing can arrive.
-fn irradiance_of_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
+pub(super) fn irradiance_of_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
     let sin = if cap.cos > 0.0 { cap.sin } else { 1.0 };
     irradiance_of_directions(receiver, cap.axis, sin, cap.solid_angle())
 }

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use super::{LampFault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_position, check_weight};
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
+use crate::light::profile::Profiles;
 use crate::math;
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::warp::Variate;
@@ -65,11 +66,11 @@ impl LampKind for PointLight {
         self.intensity
     }
 
-    fn area(&self) -> f32 {
+    fn area(&self, _profiles: Profiles<'_>) -> f32 {
         AREA
     }
 
-    fn reach(&self) -> Reach {
+    fn reach(&self, _profiles: Profiles<'_>) -> Reach {
         Reach {
             aabb: Aabb { min: self.position, max: self.position },
             normals: Cone { axis: Vec3::Z, theta: PI },
@@ -81,7 +82,7 @@ impl LampKind for PointLight {
         }
     }
 
-    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+    fn view(&self, x: &ShadingPoint, _profiles: Profiles<'_>) -> Option<ShapeView> {
         PointView::new(self.position, x.position, |_| 1.0).map(ShapeView::Point)
     }
 
@@ -89,12 +90,12 @@ impl LampKind for PointLight {
         false
     }
 
-    fn emit(&self, _point: [Variate; 2], direction: [Variate; 2], _side: f64) -> EmittedRay {
+    fn emit(&self, _point: [Variate; 2], direction: [Variate; 2], _side: f64, profiles: Profiles<'_>) -> EmittedRay {
         let direction = spherical_cap::uniform_direction(direction.map(|u| u.value())).as_vec3();
-        EmittedRay::from_point(self.position, direction, self.emission_pdf(direction))
+        EmittedRay::from_point(self.position, direction, self.emission_pdf(direction, profiles))
     }
 
-    fn emission_pdf(&self, _direction: Vec3) -> f64 {
+    fn emission_pdf(&self, _direction: Vec3, _profiles: Profiles<'_>) -> f64 {
         1.0 / SphericalCap::whole().solid_angle()
     }
 }

@@ -11,6 +11,7 @@ use super::{
 use crate::geometry::{Aabb, Cone};
 use crate::light::Sides;
 use crate::light::emitted::{EmittedRay, cosine_ray, per_direction};
+use crate::light::profile::Profiles;
 use crate::math;
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::warp::Variate;
@@ -76,11 +77,11 @@ impl LampKind for SphereLight {
         self.radiance
     }
 
-    fn area(&self) -> f32 {
+    fn area(&self, _profiles: Profiles<'_>) -> f32 {
         self.surface()
     }
 
-    fn reach(&self) -> Reach {
+    fn reach(&self, _profiles: Profiles<'_>) -> Reach {
         let half = Vec3::splat(self.radius);
         Reach {
             aabb: Aabb { min: self.center - half, max: self.center + half },
@@ -95,7 +96,7 @@ impl LampKind for SphereLight {
         }
     }
 
-    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+    fn view(&self, x: &ShadingPoint, _profiles: Profiles<'_>) -> Option<ShapeView> {
         let center = self.center.as_dvec3() - x.position.as_dvec3();
         let (distance, radius) = (math::sqrt64(center.length_squared()), f64::from(self.radius));
         let beyond = (distance - radius) * (distance + radius);
@@ -124,14 +125,14 @@ impl LampKind for SphereLight {
         }
     }
 
-    fn emit(&self, point: [Variate; 2], direction: [Variate; 2], side: f64) -> EmittedRay {
+    fn emit(&self, point: [Variate; 2], direction: [Variate; 2], side: f64, profiles: Profiles<'_>) -> EmittedRay {
         let normal = spherical_cap::uniform_direction(point.map(|u| u.value()));
         let position = self.center.as_dvec3() + f64::from(self.radius) * normal;
-        let pdf = self.emission_pdf(normal.as_vec3());
+        let pdf = self.emission_pdf(normal.as_vec3(), profiles);
         cosine_ray(position, normal.as_vec3(), self.two_sided && side < 0.5, direction, pdf)
     }
 
-    fn emission_pdf(&self, _direction: Vec3) -> f64 {
+    fn emission_pdf(&self, _direction: Vec3, _profiles: Profiles<'_>) -> f64 {
         per_direction(self.two_sided) / f64::from(self.surface())
     }
 }

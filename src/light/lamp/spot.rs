@@ -8,6 +8,7 @@ use super::point::PointView;
 use super::{LampFault, LampKind, Reach, ShapeView, VALUES, check_axis, check_position, check_weight, within};
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
+use crate::light::profile::Profiles;
 use crate::math;
 use crate::receiver::ShadingPoint;
 use crate::warp::Variate;
@@ -99,11 +100,11 @@ impl LampKind for SpotLight {
     }
 
     /// The tree takes a light for a surface, whose intensity along its normal is radiance times area.
-    fn area(&self) -> f32 {
+    fn area(&self, _profiles: Profiles<'_>) -> f32 {
         1.0
     }
 
-    fn reach(&self) -> Reach {
+    fn reach(&self, _profiles: Profiles<'_>) -> Reach {
         Reach {
             aabb: Aabb { min: self.position, max: self.position },
             normals: Cone::single(self.axis),
@@ -115,7 +116,7 @@ impl LampKind for SpotLight {
         }
     }
 
-    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+    fn view(&self, x: &ShadingPoint, _profiles: Profiles<'_>) -> Option<ShapeView> {
         PointView::new(self.position, x.position, |direction| self.falloff(direction)).map(ShapeView::Point)
     }
 
@@ -123,13 +124,13 @@ impl LampKind for SpotLight {
         false
     }
 
-    fn emit(&self, _point: [Variate; 2], direction: [Variate; 2], _side: f64) -> EmittedRay {
+    fn emit(&self, _point: [Variate; 2], direction: [Variate; 2], _side: f64, _profiles: Profiles<'_>) -> EmittedRay {
         let cap = self.cap();
         let direction = cap.direction(direction.map(|u| u.value())).as_vec3();
         EmittedRay::from_point(self.position, direction, 1.0 / cap.solid_angle())
     }
 
-    fn emission_pdf(&self, direction: Vec3) -> f64 {
+    fn emission_pdf(&self, direction: Vec3, _profiles: Profiles<'_>) -> f64 {
         let (cap, direction) = (self.cap(), direction.as_dvec3());
         let (along, across) = (cap.axis.dot(direction), cap.axis.cross(direction).length());
         let is_inside = along >= cap.cos - DIRECTION_ROUNDING && across <= cap.sin + DIRECTION_ROUNDING;

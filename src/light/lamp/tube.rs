@@ -16,6 +16,7 @@ use super::{
 use crate::geometry::{Aabb, Cone};
 use crate::light::POSITION_LIMIT;
 use crate::light::emitted::{EmittedRay, cosine_ray, per_direction};
+use crate::light::profile::Profiles;
 use crate::math;
 use crate::receiver::{Receiver, ShadingPoint};
 use crate::warp::Variate;
@@ -83,11 +84,11 @@ impl LampKind for TubeLight {
         self.radiance
     }
 
-    fn area(&self) -> f32 {
+    fn area(&self, _profiles: Profiles<'_>) -> f32 {
         self.surface()
     }
 
-    fn reach(&self) -> Reach {
+    fn reach(&self, _profiles: Profiles<'_>) -> Reach {
         let half = self.axis().as_vec3().to_array().map(|n| self.radius * math::sqrt((1.0 - n * n).max(0.0)));
         // Rounding of the axis leaves a little more.
         let half = Vec3::from_array(half) + 1e-3 * self.radius;
@@ -104,7 +105,7 @@ impl LampKind for TubeLight {
         }
     }
 
-    fn view(&self, x: &ShadingPoint) -> Option<ShapeView> {
+    fn view(&self, x: &ShadingPoint, _profiles: Profiles<'_>) -> Option<ShapeView> {
         let [start, end] = self.ends.map(|end| end.as_dvec3() - x.position.as_dvec3());
         TubeView::new([start, end], self.axis(), self.radius.into()).map(ShapeView::Tube)
     }
@@ -120,18 +121,18 @@ impl LampKind for TubeLight {
         height >= view.heights[0] && height <= view.heights[1]
     }
 
-    fn emit(&self, point: [Variate; 2], direction: [Variate; 2], _side: f64) -> EmittedRay {
+    fn emit(&self, point: [Variate; 2], direction: [Variate; 2], _side: f64, profiles: Profiles<'_>) -> EmittedRay {
         let [u1, u2] = point.map(|u| u.value());
         let (sin, cos) = math::sin_cos(core::f32::consts::TAU * u2 as f32);
         let axis = self.axis();
         let (s, t) = axis.any_orthonormal_pair();
         let normal = s * f64::from(cos) + t * f64::from(sin);
         let along = self.ends[0].as_dvec3().lerp(self.ends[1].as_dvec3(), u1);
-        let pdf = self.emission_pdf(normal.as_vec3());
+        let pdf = self.emission_pdf(normal.as_vec3(), profiles);
         cosine_ray(along + f64::from(self.radius) * normal, normal.as_vec3(), false, direction, pdf)
     }
 
-    fn emission_pdf(&self, _direction: Vec3) -> f64 {
+    fn emission_pdf(&self, _direction: Vec3, _profiles: Profiles<'_>) -> f64 {
         per_direction(false) / f64::from(self.surface())
     }
 }

@@ -171,7 +171,7 @@ fn least_crossed(at: &Viewpoint<'_>, direction: glam::Vec3) -> Option<LightPoint
     let is_wanted = |leaf: u32| {
         let light = lights.light(leaf);
         let is_less = least.get().is_none_or(|least| leaf <= least.leaf);
-        light.is_portal() && lights.scale(leaf) != 0.0 && is_less && light.is_visible(&at.x)
+        light.is_portal() && lights.scale(leaf) != 0.0 && is_less && at.receives(leaf) && light.is_visible(&at.x)
     };
     let visit = |point: LightPoint| least.set(Some(point));
     at.scene.cross(at.x.position, direction, is_wanted, visit);

@@ -22,9 +22,13 @@ pub(super) const MOST_CLASSES: usize = 4;
 
 /// Sorts lights into classes, the largest lights first. Returns the number of lights in each class.
 pub(super) fn divide(items: &mut [Item], arity: Arity) -> SmallVec<[usize; MOST_CLASSES]> {
-    let diagonal2 = |item: &Item| (item.high - item.low).length_squared();
     // At least two lanes for a class.
-    let most = MOST_CLASSES.min(arity.lanes() / 2);
+    divide_into(items, MOST_CLASSES.min(arity.lanes() / 2))
+}
+
+/// Sorts lights into at most so many classes, as [`divide`] does.
+pub(super) fn divide_into(items: &mut [Item], most: usize) -> SmallVec<[usize; MOST_CLASSES]> {
+    let diagonal2 = |item: &Item| (item.high - item.low).length_squared();
     let mut classes = SmallVec::new();
     let mut rest = items;
     while classes.len() + 1 < most {

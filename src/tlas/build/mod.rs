@@ -10,6 +10,7 @@ mod collapse;
 mod encode;
 mod fit;
 mod forest;
+mod groups;
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -18,6 +19,7 @@ use binary::{BinaryNode, join};
 use classes::divide;
 use cluster::Item;
 use collapse::collapse;
+use groups::divide_groups;
 
 use crate::bounds::LightBounds;
 use crate::parallel;
@@ -28,10 +30,24 @@ use crate::tlas::tree::Tlas;
 /// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds them all in
 /// one node. Returns it with the lights in the order of its leaves; its nodes know no bounds until [`Tlas::fit`]. Every light
 /// that has found its place is a unit of progress.
+#[cfg(test)]
 pub(crate) fn build(
     arity: Arity,
     count: usize,
     light: &(impl Fn(u32) -> LightBounds + Sync),
+    progress: &Progress<'_>,
+) -> Result<(Tlas, Vec<u32>), Cancelled> {
+    build_in_groups(arity, count, light, &[], progress)
+}
+
+/// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds them all in
+/// one node. `groups` are the light groups of each, or nothing. Returns the tree with the lights in the order of its leaves; its
+/// nodes know no bounds until [`Tlas::fit`]. Every light that has found its place is a unit of progress.
+pub(crate) fn build_in_groups(
+    arity: Arity,
+    count: usize,
+    light: &(impl Fn(u32) -> LightBounds + Sync),
+    groups: &[u32],
     progress: &Progress<'_>,
 ) -> Result<(Tlas, Vec<u32>), Cancelled> {
     if count == 0 {
@@ -40,13 +56,17 @@ pub(crate) fn build(
     let arity = arity.narrowed_to(count);
     let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
     let mut binary = vec![BinaryNode::default(); 2 * count - 1];
-    let classes = divide(&mut items, arity);
+    let classes = if groups.is_empty() { divide(&mut items, arity) } else { divide_groups(&mut items, groups, arity) };
     join(&mut items, &mut binary, &classes, progress);
     progress.check()?;
     drop(items);
-    Ok(match arity {
+    let (mut tlas, order) = match arity {
         Arity::Four => collapse::<4>(arity, &binary),
         Arity::Eight => collapse::<8>(arity, &binary),
         Arity::Sixteen => collapse::<16>(arity, &binary),
-    })
+    };
+    if !groups.is_empty() {
+        tlas.note_groups(|leaf| groups[order[leaf as usize] as usize]);
+    }
+    Ok((tlas, order))
 }

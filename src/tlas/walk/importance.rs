@@ -128,7 +128,11 @@ impl<const N: usize> WideTree<'_, N> {
     #[inline(always)]
     pub(super) fn weights(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> [f32; N] {
         let node = &self.nodes[index];
-        let Estimates { mut weights, mut largest, mut opened, .. } = node.asked(x, oracle);
+        let mut estimates = node.asked(x, oracle);
+        if !self.groups.is_empty() {
+            estimates = self.within_groups(index, oracle.shading_point().groups, estimates);
+        }
+        let Estimates { mut weights, mut largest, mut opened, .. } = estimates;
         if opened != 0 {
             while opened != 0 {
                 let lane = opened.trailing_zeros();
@@ -145,7 +149,11 @@ impl<const N: usize> WideTree<'_, N> {
     /// Returns the sum of the weights of a node's children.
     #[inline(always)]
     fn opened(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> f32 {
-        let sum: f32 = self.nodes[index].asked(x, oracle).weights.iter().sum();
+        let mut estimates = self.nodes[index].asked(x, oracle);
+        if !self.groups.is_empty() {
+            estimates = self.within_groups(index, oracle.shading_point().groups, estimates);
+        }
+        let sum: f32 = estimates.weights.iter().sum();
         only_if(sum > 0.0, within_range(sum))
     }
 }

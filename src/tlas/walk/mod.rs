@@ -5,8 +5,10 @@
 
 mod beam;
 pub(in crate::tlas) mod descend;
+mod groups;
 mod importance;
 pub(in crate::tlas) mod ray;
+mod segment;
 mod shaped;
 mod split;
 
@@ -15,6 +17,7 @@ use glam::Vec3;
 pub(crate) use beam::{Beam, Outgoing};
 pub(crate) use descend::{Descent, FirstWeights, INTERLEAVED};
 pub(crate) use importance::LeafOracle;
+pub(crate) use segment::{ClusterAlong, ClusterMoments, Clusters, Stretch};
 pub use split::Splitting;
 
 use crate::receiver::Lobe;
@@ -94,6 +97,17 @@ impl TlasView<'_> {
     #[inline]
     pub(crate) fn cross(&self, origin: Vec3, direction: Vec3, visit: impl FnMut(u32)) {
         for_arity!(self, tree => tree.cross(origin, direction, visit));
+    }
+
+    /// Finds clusters of lights that are small for their distance from a stretch of a ray, as far as there is room for.
+    pub(crate) fn clusters_along(&self, stretch: &Stretch, groups: u32) -> Clusters {
+        for_arity!(self, tree => tree.clusters_along(stretch, groups))
+    }
+
+    /// Calls `visit` for each leaf whose box parallel rays in a direction, a unit vector, may meet that start on a stretch of
+    /// another ray.
+    pub(crate) fn meet_strip(&self, stretch: &Stretch, direction: Vec3, visit: impl FnMut(u32)) {
+        for_arity!(self, tree => tree.meet_strip(stretch, direction, visit));
     }
 
     /// Calls `visit` for each leaf whose box may hold a point in a cone around a unit vector, with an angular radius of

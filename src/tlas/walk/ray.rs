@@ -34,7 +34,7 @@ impl<const N: usize> WideTree<'_, N> {
     /// Visits the leaves in the lanes of each node, a set of bits, that `entered` tells. Walks on parent pointers, so
     /// that any depth needs no more than a fixed stack.
     #[inline]
-    fn walk(&self, entered: impl Fn(&Node<N>) -> u32, mut visit: impl FnMut(u32)) {
+    pub(super) fn walk(&self, entered: impl Fn(&Node<N>) -> u32, mut visit: impl FnMut(u32)) {
         if self.nodes.is_empty() {
             (0..self.leaves.len() as u32).for_each(visit);
             return;

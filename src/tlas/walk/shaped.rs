@@ -10,7 +10,7 @@ use super::importance::Estimates;
 use crate::math;
 use crate::receiver::{Lobe, ReceiverLanes};
 use crate::simd::{InstructionSet, Kernel};
-use crate::tlas::node::{Child, Node, WIDE, wide};
+use crate::tlas::node::{Child, LANE_TWO_SIDED, Node, WIDE, wide};
 
 /// Rounding granted to the distance from a cone, relative to that of the cluster. *Proved*: covers the rounding of the axis to
 /// ten bits a component, which is in the angle of the cone, and of the sums, 1e-6. A larger one culls less.
@@ -24,6 +24,9 @@ impl<const N: usize> Node<N> {
         let [shaped, everywhere, above] = InstructionSet::best().run(LaneSets { node: self, x });
         // No side is averted of what sends everywhere: what is left of the doubt is the horizon.
         estimates.doubtful[0] &= !(shaped & everywhere & above);
+        // What sends everywhere and has two sides is asked what it sends.
+        let uneven = shaped & everywhere & self.uneven_leaves();
+        estimates.doubtful.iter_mut().for_each(|set| *set |= uneven);
         let mut waiting = shaped & !everywhere;
         if waiting == 0 {
             return estimates;
@@ -35,6 +38,14 @@ impl<const N: usize> Node<N> {
         }
         estimates.largest = estimates.weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()));
         estimates
+    }
+
+    /// Returns the lanes of leaves that are two-sided and may send something, as a set of bits.
+    #[inline]
+    fn uneven_leaves(&self) -> u32 {
+        let (normals, energies) = (self.normals, self.energies);
+        let of = |lane: usize| u32::from(normals[lane] & LANE_TWO_SIDED != 0 && energies[lane] != 0) << lane;
+        (usize::from(self.node_count)..usize::from(self.width).min(N)).fold(0, |set, lane| set | of(lane))
     }
 
     /// Corrects the estimates of a child that sends into a narrow cone.

@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 
 use fanlight::{
-    DiskLight, Environment, Filter, Illumination, Lamp, LightSampler, Mesh, PointLight, Sides, SphereLight, SpotLight,
-    Texture, TextureId, TubeLight, Weight, Wrap,
+    DiskLight, DistantLight, Environment, Filter, Illumination, Lamp, LightSampler, LightSamplerBuilder, Mesh,
+    PointLight, Profile, ProfileLight, Sides, SphereLight, SpotLight, Texture, TextureId, TubeLight, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -30,8 +30,8 @@ pub(crate) fn lights(reader: &mut Reader<'_>) -> Option<LightSampler> {
     for soup in &meshes {
         // A mesh that is refused leaves the builder as it was.
         let _ = builder.add_mesh(&soup.mesh(&textures));
-        if let Some(lamp) = soup.lamp() {
-            let _ = builder.add_light(lamp);
+        if let Some(lamp) = soup.lamp(&mut builder) {
+            let _ = builder.add_light_to(soup.groups(), lamp);
         }
     }
     builder.build().ok()
@@ -61,6 +61,13 @@ fn some_lights(kind: u8) -> LightSampler {
     let indices = &indices[..count];
     let mesh = if kind & 8 != 0 { Mesh::portal(&positions, indices) } else { Mesh::emitter(&positions, indices) };
     builder.add_mesh(&mesh.uvs(&uvs).weight(weight).sides(Sides::Two)).expect("a valid mesh");
+    if kind == 15 {
+        // What few scenes have.
+        let profile = Profile { vertical: &[0.0, 1.0], horizontal: &[0.0], intensities: &[1.0, 0.5] };
+        let profile = builder.add_profile(&profile).expect("a valid profile");
+        builder.add_light_to(3, ProfileLight::new(Vec3::X, Vec3::Z, profile, 1.0)).expect("a valid light");
+        builder.add_light_to(1, DistantLight::new(Vec3::Z, 1.0).angular_radius(0.1)).expect("a valid light");
+    }
     builder.build().expect("few triangles")
 }
 
@@ -135,16 +142,27 @@ impl Soup {
     }
 
     /// A light that is no mesh, where there is no triangle: by no byte of its own.
-    fn lamp(&self) -> Option<Lamp> {
+    fn lamp(&self, builder: &mut LightSamplerBuilder<'_>) -> Option<Lamp> {
         let ([a, b, ..], true) = (&self.positions[..], self.indices.is_empty()) else { return None };
         let (weight, size) = (self.weight.unwrap_or(1.0), self.uvs[0].x);
         Some(match self.positions.len() % 5 {
+            0 if self.sides == Sides::Two => DistantLight::new(*a, weight).angular_radius(size).into(),
+            1 if self.sides == Sides::Two => {
+                let profile =
+                    Profile { vertical: &[0.0, b.x], horizontal: &[0.0, b.y], intensities: &[weight, 0.0, 1.0, size] };
+                ProfileLight::new(*a, *b, builder.add_profile(&profile).ok()?, weight).facing(*a).into()
+            }
             0 => PointLight::new(*a, weight).into(),
             1 => SpotLight::new(*a, *b, weight, [0.2, size]).into(),
             2 => SphereLight::new(*a, size, weight).sides(self.sides).into(),
             3 => DiskLight::new(*a, *b, size, weight).sides(self.sides).into(),
             _ => TubeLight::new([*a, *b], size, weight).into(),
         })
+    }
+
+    /// Light groups, by no byte of their own.
+    fn groups(&self) -> u32 {
+        if self.positions.len() % 3 == 2 { 2 } else { u32::MAX }
     }
 
     fn mesh(&self, textures: &[TextureId]) -> Mesh<'_> {
@@ -157,6 +175,6 @@ impl Soup {
             Ok(constant) => Weight::Constant(constant),
             Err(image) => textures.get(image).map_or(Weight::Constant(1.0), |texture| Weight::Texture(*texture)),
         };
-        mesh.uvs(&self.uvs).weight(weight).sides(self.sides)
+        mesh.uvs(&self.uvs).weight(weight).sides(self.sides).groups(self.groups())
     }
 }

@@ -4,7 +4,8 @@ pub(crate) mod build;
 pub(crate) mod reader;
 
 use fanlight::{
-    Glossy, LightSample, LightSampler, LightSamplerView, Receiver, SampledLight, Scattering, ShadingPoint, Splitting,
+    Glossy, LightSample, LightSampler, LightSamplerView, RaySegment, Receiver, SampledLight, Scattering, ShadingPoint,
+    Splitting,
 };
 use glam::Vec3;
 use reader::Reader;
@@ -75,8 +76,11 @@ fn receiver(reader: &mut Reader<'_>) -> Receiver {
 fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
     let x = ShadingPoint::new(reader.vector(), receiver(reader));
     let u = [(); 3].map(|()| reader.float());
-    let at = lights.at(&x);
     let direction = reader.vector();
+    // By no byte of its own, so that inputs that were found keep their meaning.
+    let x = x.with_groups([u32::MAX, u32::MAX, 1, 2][direction.x.to_bits() as usize % 4]);
+    let at = lights.at(&x);
+    along(lights, &x, u, direction);
     assert_density(lights.at(&x).pdf_direction(direction));
     if let Some(sample) = lights.at(&x).sample(u) {
         check(lights, &x, &sample);
@@ -96,6 +100,20 @@ fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
             };
             assert_close(pdf, sample.pdf, sample);
         }
+    }
+}
+
+/// Draws a distance along a ray, and checks its density.
+fn along(lights: &LightSamplerView<'_>, x: &ShadingPoint, u: [f32; 3], direction: Vec3) {
+    let segment = RaySegment::new(x.position, direction, u[0].abs() * 10.0, u[1].abs()).with_groups(x.groups);
+    let along = lights.along(&segment.receiver(x.receiver));
+    if let Some((distance, pdf)) = along.sample_distance(u[2]) {
+        assert!(distance >= 0.0 && distance <= segment.length && pdf > 0.0 && pdf.is_finite(), "{segment:?}");
+        assert_close(along.pdf_distance(distance), pdf, &segment);
+    }
+    assert_density(along.pdf(u[1], direction));
+    if let Some(sample) = along.sample([u[2], u[0], u[1], u[2]]) {
+        check_numbers(&sample.light);
     }
 }
 
@@ -128,7 +146,7 @@ fn check_numbers(sample: &LightSample) {
     let LightSample { position, normal, direction, distance, pdf, pdf_area, pmf, .. } = *sample;
     assert!(position.is_finite() && normal.is_finite() && direction.is_finite(), "{sample:?}");
     assert!((direction.length() - 1.0).abs() < 1e-4, "{sample:?}");
-    assert!(distance >= 0.0 && (distance.is_finite() || sample.light == SampledLight::Environment), "{sample:?}");
+    assert!(distance >= 0.0 && (distance.is_finite() || sample.hit().is_none()), "{sample:?}");
     assert!(pdf > 0.0 && pdf_area > 0.0 && pmf > 0.0, "{sample:?}");
     assert!(pdf.is_finite() && pdf_area.is_finite() && pmf.is_finite(), "{sample:?}");
 }
@@ -143,8 +161,8 @@ fn assert_close(found: f32, expected: f32, context: &impl core::fmt::Debug) {
 
 /// Draws a ray of light, and checks its density.
 fn emit(lights: &LightSampler, reader: &mut Reader<'_>) {
-    let emission = lights.emission();
     let u = [(); 5].map(|()| reader.float());
+    let emission = lights.emission().within(Vec3::splat(u[4]), u[3]);
     if let Some(ray) = emission.sample(u) {
         assert!(ray.position.is_finite() && (ray.direction.length() - 1.0).abs() < 1e-4, "{ray:?}");
         assert!(ray.pdf > 0.0 && ray.pdf.is_finite() && ray.pmf > 0.0, "{ray:?}");

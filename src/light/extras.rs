@@ -1,0 +1,167 @@
+//! What few scenes have: light groups, profiles and distant lights, in one buffer, so that all others carry one slice more.
+//!
+//! The buffer is empty where a scene has none of them. Otherwise it is a [`Header`] and then the arrays that it counts.
+
+use alloc::vec::Vec;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::distant::{DistantGroup, DistantRecord};
+use super::profile::Profiles;
+use crate::error::Error;
+use crate::receiver::ALL_GROUPS;
+
+/// Numbers of elements of the arrays, in their order.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+struct Header {
+    /// Light groups of every leaf, and then of the environment as a light; none if all lights are in all groups.
+    groups: u32,
+    /// Distant lights that can send something, neighbors in direction next to each other.
+    distants: u32,
+    /// Groups of neighbors in direction.
+    distant_groups: u32,
+    /// Where each profile starts among the values, and the end; none without profiles.
+    profile_starts: u32,
+    /// Tables of the profiles.
+    profile_values: u32,
+}
+
+/// Words of a [`Header`].
+const HEADER: usize = size_of::<Header>() / size_of::<u32>();
+/// Words of a distant light.
+const DISTANT: usize = size_of::<DistantRecord>() / size_of::<u32>();
+/// Words of a group of distant lights.
+const DISTANT_GROUP: usize = size_of::<DistantGroup>() / size_of::<u32>();
+
+/// The buffer in borrowed memory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extras<'a>(pub(super) &'a [u32]);
+
+/// Returns the buffer of these arrays.
+pub(super) fn pack(
+    groups: &[u32],
+    distants: &[DistantRecord],
+    distant_groups: &[DistantGroup],
+    [profile_starts, profile_values]: [&[u32]; 2],
+) -> Vec<u32> {
+    if groups.is_empty() && distants.is_empty() && profile_starts.is_empty() {
+        return Vec::new();
+    }
+    let header = Header {
+        groups: groups.len() as u32,
+        distants: distants.len() as u32,
+        distant_groups: distant_groups.len() as u32,
+        profile_starts: profile_starts.len() as u32,
+        profile_values: profile_values.len() as u32,
+    };
+    let arrays = [
+        bytemuck::cast_slice(core::slice::from_ref(&header)),
+        groups,
+        bytemuck::cast_slice(distants),
+        bytemuck::cast_slice(distant_groups),
+        profile_starts,
+        profile_values,
+    ];
+    arrays.concat()
+}
+
+/// Replaces the distant lights and their groups by as many others.
+pub(super) fn replace_distants(extras: &mut [u32], distants: &[DistantRecord], distant_groups: &[DistantGroup]) {
+    let start = HEADER + Extras(extras).header().groups as usize;
+    let (distants, groups): (&[u32], &[u32]) = (bytemuck::cast_slice(distants), bytemuck::cast_slice(distant_groups));
+    let middle = start + distants.len();
+    if let Some(place) = extras.get_mut(start..middle) {
+        place.copy_from_slice(distants);
+    }
+    if let Some(place) = extras.get_mut(middle..middle + groups.len()) {
+        place.copy_from_slice(groups);
+    }
+}
+
+impl<'a> Extras<'a> {
+    /// Nothing.
+    pub(super) const NONE: Self = Self(&[]);
+
+    /// Whether the scene has none of what is kept here.
+    #[inline(always)]
+    pub(crate) fn is_empty(self) -> bool {
+        self.0.is_empty()
+    }
+
+    #[inline]
+    fn header(self) -> Header {
+        self.0.get(..HEADER).map_or_else(Header::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
+    }
+
+    /// Returns so many words of an array, after so many of the arrays before. Words that are not there, which validation
+    /// refuses, give none.
+    #[inline]
+    fn words(self, before: usize, count: usize) -> &'a [u32] {
+        let start = HEADER + before;
+        self.0.get(start..start + count).unwrap_or(&[])
+    }
+
+    /// Returns the light groups of every leaf and of the environment; nothing if all lights are in all groups.
+    #[inline]
+    fn groups(self) -> &'a [u32] {
+        self.words(0, self.header().groups as usize)
+    }
+
+    /// Returns the light groups of a leaf.
+    #[inline(always)]
+    pub(crate) fn groups_of(self, leaf: u32) -> u32 {
+        if self.is_empty() { ALL_GROUPS } else { self.groups().get(leaf as usize).copied().unwrap_or(ALL_GROUPS) }
+    }
+
+    /// Returns the light groups of the environment as a light.
+    pub(crate) fn groups_of_environment(self) -> u32 {
+        self.groups().last().copied().unwrap_or(ALL_GROUPS)
+    }
+
+    /// Returns the distant lights.
+    pub(crate) fn distants(self) -> &'a [DistantRecord] {
+        let Header { groups, distants, .. } = self.header();
+        bytemuck::cast_slice(self.words(groups as usize, distants as usize * DISTANT))
+    }
+
+    /// Returns the groups of distant lights.
+    pub(crate) fn distant_groups(self) -> &'a [DistantGroup] {
+        let Header { groups, distants, distant_groups, .. } = self.header();
+        let before = groups as usize + distants as usize * DISTANT;
+        bytemuck::cast_slice(self.words(before, distant_groups as usize * DISTANT_GROUP))
+    }
+
+    /// Returns the profiles.
+    pub(super) fn profiles(self) -> Profiles<'a> {
+        let Header { groups, distants, distant_groups, profile_starts, profile_values } = self.header();
+        let [starts, values] = [profile_starts, profile_values].map(|count| count as usize);
+        let before = groups as usize + distants as usize * DISTANT + distant_groups as usize * DISTANT_GROUP;
+        let values = bytemuck::cast_slice(self.words(before + starts, values));
+        Profiles { starts: self.words(before, starts), values }
+    }
+
+    /// Checks that the arrays are where the header says, and what they hold. `leaves` is the number of lights in the tree.
+    pub(super) fn validate(self, leaves: usize) -> Result<(), Error> {
+        if self.is_empty() {
+            return Ok(());
+        }
+        let Header { groups, distants, distant_groups, profile_starts, profile_values } = self.header();
+        let counts = [
+            (groups, 1),
+            (distants, DISTANT),
+            (distant_groups, DISTANT_GROUP),
+            (profile_starts, 1),
+            (profile_values, 1),
+        ];
+        let words = counts.iter().fold(HEADER as u64, |sum, (count, size)| sum + u64::from(*count) * *size as u64);
+        if words != self.0.len() as u64 {
+            return Err(Error::bytes("length of groups, profiles and distant lights", 0, self.0.len(), words));
+        }
+        if groups > 0 {
+            Error::unless_equal("number of light groups", groups as usize, leaves + 1)?;
+        }
+        super::distant::validate(self.distants(), self.distant_groups())?;
+        self.profiles().validate()
+    }
+}

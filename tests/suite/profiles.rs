@@ -1,0 +1,315 @@
+//! Lights with profiles: intensities against a second table lookup, choices against exact irradiances, photons, bytes, errors.
+
+use core::f32::consts::{FRAC_PI_2, PI, TAU};
+
+use crate::common::lights::{ARITIES, aligned};
+use crate::common::pcg::Pcg32;
+use crate::common::statistics::Mean;
+use fanlight::{
+    LightId, LightSampler, LightSamplerView, PointLight, Profile, ProfileId, ProfileLight, Receiver, SampledLight,
+    ShadingPoint,
+};
+use glam::{DVec3, Vec3};
+
+/// A profile with its arrays.
+#[derive(Clone, Debug)]
+struct Table {
+    vertical: Vec<f32>,
+    horizontal: Vec<f32>,
+    intensities: Vec<f32>,
+}
+
+impl Table {
+    fn profile(&self) -> Profile<'_> {
+        Profile { vertical: &self.vertical, horizontal: &self.horizontal, intensities: &self.intensities }
+    }
+
+    /// Bilinear interpolation, written once more: cell by cell, without a search.
+    fn intensity(&self, theta: f64, phi: f64) -> f64 {
+        let (rows, columns) = (self.vertical.len(), self.horizontal.len());
+        for row in 0..rows - 1 {
+            let [a, b] = [row, row + 1].map(|row| f64::from(self.vertical[row]));
+            if !(a..=b).contains(&theta) {
+                continue;
+            }
+            let v = (theta - a) / (b - a);
+            let value = |row: usize, column: usize| f64::from(self.intensities[row * columns + column % columns]);
+            if columns == 1 {
+                return value(row, 0) * (1.0 - v) + value(row + 1, 0) * v;
+            }
+            for column in 0..columns {
+                let c = f64::from(self.horizontal[column]);
+                let d = self
+                    .horizontal
+                    .get(column + 1)
+                    .map_or_else(|| f64::from(self.horizontal[0]) + core::f64::consts::TAU, |next| f64::from(*next));
+                for turn in [-1.0, 0.0, 1.0] {
+                    let h = (phi + turn * core::f64::consts::TAU - c) / (d - c);
+                    if (0.0..=1.0).contains(&h) {
+                        let mix = |row| value(row, column) * (1.0 - h) + value(row, column + 1) * h;
+                        return mix(row) * (1.0 - v) + mix(row + 1) * v;
+                    }
+                }
+            }
+        }
+        0.0
+    }
+}
+
+fn ascending(pcg: &mut Pcg32, count: usize, range: [f32; 2]) -> Vec<f32> {
+    let step = (range[1] - range[0]) / count as f32;
+    (0..count).map(|i| range[0] + step * (i as f32 + 0.1 + 0.8 * pcg.f32())).collect()
+}
+
+fn tables(pcg: &mut Pcg32) -> Vec<Table> {
+    let mut tables = vec![];
+    for (rows, columns, reach) in [(2, 1, PI), (9, 1, 1.2), (7, 5, 1.0), (19, 24, PI), (5, 8, FRAC_PI_2)] {
+        let vertical = ascending(pcg, rows, [0.0, reach]);
+        let horizontal = ascending(pcg, columns, [0.0, TAU - 0.01]);
+        let intensities = (0..rows * columns).map(|_| pcg.f32() * pcg.f32()).collect();
+        tables.push(Table { vertical, horizontal, intensities });
+    }
+    // One lit entry.
+    for (rows, columns, lit) in [(10, 12, 55), (10, 12, 0), (10, 12, 119), (4, 1, 3)] {
+        let vertical = (0..rows).map(|i| PI * i as f32 / (rows - 1) as f32).collect();
+        let horizontal = (0..columns).map(|i| TAU * i as f32 / columns as f32).collect();
+        let intensities = (0..rows * columns).map(|i| if i == lit { 5.0 } else { 0.0 }).collect();
+        tables.push(Table { vertical, horizontal, intensities });
+    }
+    tables
+}
+
+/// A lamp and what it refers to.
+struct Placed<'a> {
+    table: &'a Table,
+    lamp: ProfileLight,
+    position: Vec3,
+    frame: [DVec3; 3],
+    scale: f64,
+}
+
+fn place<'a>(table: &'a Table, profile: ProfileId, pcg: &mut Pcg32) -> Placed<'a> {
+    let (axis, zero, scale) = (pcg.direction(), pcg.direction(), 0.5 + pcg.f32());
+    let position = 2.0 * Vec3::from_array(pcg.cube());
+    let z = axis.as_dvec3().normalize();
+    let x = zero.as_dvec3().reject_from(z).normalize();
+    let lamp = ProfileLight::new(position, axis, profile, scale).facing(zero);
+    Placed { table, lamp, position, frame: [x, z.cross(x), z], scale: scale.into() }
+}
+
+impl Placed<'_> {
+    fn towards(&self, direction: DVec3) -> f64 {
+        let [x, y, z] = self.frame.map(|axis| axis.dot(direction));
+        self.scale * self.table.intensity(x.hypot(y).atan2(z), y.atan2(x))
+    }
+
+    fn irradiance(&self, x: &ShadingPoint) -> f64 {
+        let to = self.position.as_dvec3() - x.position.as_dvec3();
+        let direction = to.normalize();
+        let weight = match x.receiver {
+            Receiver::Surface(normal) => normal.as_dvec3().dot(direction).max(0.0),
+            _ => 1.0,
+        };
+        weight * self.towards(-direction) / to.length_squared()
+    }
+}
+
+/// Up to a node of lamps: each is chosen by exactly what it sends, and is never chosen where it sends nothing.
+#[test]
+fn lamps_are_chosen_by_their_intensity() {
+    let (mut lit, mut dark) = (0, 0);
+    for round in 0..12 {
+        let mut pcg = Pcg32::new(round, 181);
+        let tables = tables(&mut pcg);
+        let mut builder = LightSampler::builder();
+        let mut placed = vec![];
+        let count = [1, 2, 9, 14][round as usize % 4];
+        for i in 0..count {
+            let table = &tables[(i + round as usize) % tables.len()];
+            let profile = builder.add_profile(&table.profile()).expect("a valid profile");
+            let lamp = place(table, profile, &mut pcg);
+            builder.add_light(lamp.lamp).expect("a valid lamp");
+            placed.push(lamp);
+        }
+        let lights = builder.build().expect("few lights");
+        for i in 0..40 {
+            let position = 3.0 * Vec3::from_array(pcg.cube()) - 0.5;
+            let receiver = if i % 2 == 0 { Receiver::Volume } else { Receiver::Surface(pcg.direction()) };
+            let (x, at) = (ShadingPoint::new(position, receiver), lights.at(&ShadingPoint::new(position, receiver)));
+            let exact: Vec<f64> = placed.iter().map(|lamp| lamp.irradiance(&x)).collect();
+            let total: f64 = exact.iter().sum();
+            if total == 0.0 {
+                assert_eq!(at.sample(pcg.cube()), None);
+                continue;
+            }
+            for (number, exact) in exact.iter().enumerate() {
+                let pmf = f64::from(at.pmf_light(LightId::from_index(number as u32)));
+                // Energies have three digits.
+                let expected = exact / total;
+                let is_far = exact / total < 1e-3;
+                assert!(is_far || (pmf / expected - 1.0).abs() < 0.02, "{x:?}: {pmf}, not {expected}");
+                lit += usize::from(!is_far);
+                if *exact == 0.0 {
+                    dark += 1;
+                    assert!(pmf < 1e-4, "{pmf}");
+                }
+            }
+            let Some(sample) = at.sample(pcg.cube()) else { continue };
+            let SampledLight::Punctual(id) = sample.light else { panic!("{sample:?}") };
+            assert!((at.pmf_light(id) / sample.pdf - 1.0).abs() < 1e-5);
+            let lamp = &placed[id.index() as usize];
+            let own = f64::from(lamp.lamp.intensity_towards(&lamp.table.profile(), -sample.direction));
+            let exact = lamp.towards(-sample.direction.as_dvec3());
+            assert!((own - exact).abs() < 1e-4 * exact + 1e-5, "{own}, not {exact}");
+        }
+    }
+    assert!(lit > 500 && dark > 100, "{lit} lit, {dark} dark");
+}
+
+/// Many lamps: samples bring the sum of what all send.
+#[test]
+fn many_lamps_bring_the_sum_of_all() {
+    for round in 0..3 {
+        let mut pcg = Pcg32::new(round, 182);
+        let tables = tables(&mut pcg);
+        let mut builder = LightSampler::builder().arity(ARITIES[round as usize]);
+        let ids: Vec<ProfileId> =
+            tables.iter().map(|table| builder.add_profile(&table.profile()).expect("a valid profile")).collect();
+        let placed: Vec<Placed<'_>> = (0..300)
+            .map(|i| {
+                let lamp = place(&tables[i % tables.len()], ids[i % tables.len()], &mut pcg);
+                builder.add_light(lamp.lamp).expect("a valid lamp");
+                lamp
+            })
+            .collect();
+        let lights = builder.build().expect("few lights");
+        for _ in 0..4 {
+            let x = ShadingPoint::surface(2.0 * Vec3::from_array(pcg.cube()), pcg.direction());
+            let exact: f64 = placed.iter().map(|lamp| lamp.irradiance(&x)).sum();
+            let (at, mut mean) = (lights.at(&x), Mean::default());
+            for _ in 0..30_000 {
+                mean.add(at.sample(pcg.cube()).map_or(0.0, |sample| {
+                    let lamp = &placed[sample.light.id().expect("a lamp").index() as usize];
+                    lamp.irradiance(&x) / f64::from(sample.pdf)
+                }));
+            }
+            let (found, error) = (mean.mean(), mean.error());
+            assert!((found - exact).abs() < 5.0 * error + 1e-4 * exact, "{found} ± {error}, not {exact}");
+            assert!(error < 0.05 * exact, "{error} of {exact}");
+        }
+    }
+}
+
+/// Rays of light carry the power of the table, and their densities agree.
+#[test]
+fn photons_carry_the_power_of_the_table() {
+    let mut pcg = Pcg32::new(3, 183);
+    for table in tables(&mut pcg) {
+        let mut builder = LightSampler::builder();
+        let profile = builder.add_profile(&table.profile()).expect("a valid profile");
+        let lamp = place(&table, profile, &mut pcg);
+        builder.add_light(lamp.lamp).expect("a valid lamp");
+        let lights = builder.build().expect("one light");
+        let emission = lights.emission();
+        let mut mean = Mean::default();
+        for _ in 0..20_000 {
+            let ray = emission.sample(core::array::from_fn(|_| pcg.f32()));
+            mean.add(ray.map_or(0.0, |ray| {
+                let again = emission.pdf_light(LightId::from_index(0), ray.direction);
+                assert!((again / ray.pdf - 1.0).abs() < 1e-5);
+                lamp.towards(ray.direction.as_dvec3()) / f64::from(ray.pdf)
+            }));
+        }
+        let steps = 400;
+        let mut exact = 0.0;
+        for i in 0..steps {
+            let theta = (f64::from(i) + 0.5) * core::f64::consts::PI / f64::from(steps);
+            for j in 0..steps {
+                let phi = (f64::from(j) + 0.5) * core::f64::consts::TAU / f64::from(steps);
+                exact += theta.sin() * lamp.scale * table.intensity(theta, phi);
+            }
+        }
+        exact *= 2.0 * (core::f64::consts::PI / f64::from(steps)).powi(2);
+        let (found, error) = (mean.mean(), mean.error());
+        assert!((found - exact).abs() < 5.0 * error + 3e-3 * exact, "{table:?}: {found} ± {error}, not {exact}");
+        // The table's cells differ little inside, next to each other.
+        assert!(error < 0.02 * exact, "{table:?}: {error}");
+    }
+}
+
+/// Every changed word is refused, or harmless; lamps keep their profiles when they move.
+#[test]
+fn profiles_survive_bytes_and_refits() {
+    let mut pcg = Pcg32::new(4, 184);
+    let tables = tables(&mut pcg);
+    let mut builder = LightSampler::builder();
+    for table in tables.iter().take(3) {
+        let profile = builder.add_profile(&table.profile()).expect("a valid profile");
+        builder.add_light(place(table, profile, &mut pcg).lamp).expect("a valid lamp");
+    }
+    let mut lights = builder.build().expect("few lights");
+    let words = aligned(&lights.to_bytes());
+    let view = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+    assert_eq!(view.to_bytes(), lights.to_bytes());
+    let (mut refused, mut loaded) = (0, 0);
+    for at in 0..words.len() {
+        for change in [1 << 15, 1 << 30, u32::MAX] {
+            let mut changed = words.clone();
+            changed[at] ^= change;
+            let Ok(view) = LightSamplerView::from_bytes(bytemuck::cast_slice(&changed)) else {
+                refused += 1;
+                continue;
+            };
+            loaded += 1;
+            let at = view.at(&ShadingPoint::volume(Vec3::splat(0.3)));
+            for _ in 0..3 {
+                if let Some(sample) = at.sample(pcg.cube()) {
+                    assert!(sample.pdf > 0.0 && sample.pdf.is_finite() && sample.position.is_finite());
+                }
+                if let Some(ray) = view.emission().sample(core::array::from_fn(|_| pcg.f32())) {
+                    assert!(ray.pdf > 0.0 && ray.pdf.is_finite() && ray.direction.is_finite(), "{ray:?}");
+                }
+            }
+        }
+    }
+    assert!(refused > 200 && loaded > 200, "{refused} refused, {loaded} loaded");
+    let id = LightId::from_index(1);
+    lights.refit_lights(&[(id, PointLight::new(Vec3::ZERO, 1.0).into())]).expect("a valid update");
+    let moved = place(&tables[1], ProfileId::from_index(1), &mut pcg);
+    lights.refit_lights(&[(id, moved.lamp.into())]).expect("a valid update");
+    let x = ShadingPoint::volume(Vec3::splat(-1.0));
+    let sum: f32 = (0..3).map(|i| lights.at(&x).pmf_light(LightId::from_index(i))).sum();
+    assert!((sum - 1.0).abs() < 1e-5 || sum == 0.0);
+    let unknown = ProfileLight::new(Vec3::ZERO, Vec3::Z, ProfileId::from_index(3), 1.0);
+    let error = lights.refit_lights(&[(id, unknown.into())]).expect_err("no such profile").to_string();
+    assert!(error.contains("light 1") && error.contains("profile 3"), "{error}");
+}
+
+#[test]
+fn bad_profiles_are_clear_errors() {
+    let refuse = |vertical: &[f32], horizontal: &[f32], intensities: &[f32], part: &str| {
+        let profile = Profile { vertical, horizontal, intensities };
+        let error = LightSampler::builder().add_profile(&profile).expect_err("an invalid profile").to_string();
+        assert!(error.contains(part), "{error} lacks {part}");
+    };
+    refuse(&[0.0], &[0.0], &[1.0], "vertical angles");
+    refuse(&[0.0, 1.0], &[], &[], "horizontal angles");
+    refuse(&[0.0, 0.0], &[0.0], &[1.0; 2], "vertical angle 1");
+    refuse(&[0.0, f32::NAN], &[0.0], &[1.0; 2], "vertical angle 1");
+    refuse(&[0.0, 3.2], &[0.0], &[1.0; 2], "vertical angle 1");
+    refuse(&[0.0, 1.0], &[0.0, TAU], &[1.0; 4], "horizontal angle 1");
+    refuse(&[0.0, 1.0], &[-1.0, 0.0], &[1.0; 4], "horizontal angle 0");
+    refuse(&[0.0, 1.0], &[0.0], &[1.0; 3], "number of intensities");
+    refuse(&[0.0, 1.0], &[0.0], &[1.0, -1.0], "intensity 1");
+    refuse(&[0.0, 1.0], &[0.0], &[f32::INFINITY, 1.0], "intensity 0");
+    let lamp = ProfileLight::new(Vec3::ZERO, Vec3::Z, ProfileId::from_index(0), 1.0);
+    let error = LightSampler::builder().add_light(lamp).expect_err("no such profile").to_string();
+    assert!(error.contains("light 0") && error.contains("profile 0"), "{error}");
+    let profile = Profile { vertical: &[0.0, 1.0], horizontal: &[0.0], intensities: &[1.0, 1.0] };
+    let mut builder = LightSampler::builder();
+    let id = builder.add_profile(&profile).expect("a valid profile");
+    let error = builder.add_light(ProfileLight::new(Vec3::ZERO, Vec3::ZERO, id, 1.0)).expect_err("no axis");
+    assert!(error.to_string().contains("axis"));
+    let error = builder.add_light(ProfileLight::new(Vec3::ZERO, Vec3::Z, id, f32::NAN)).expect_err("no scale");
+    assert!(error.to_string().contains("scale"));
+}
