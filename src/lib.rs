@@ -145,6 +145,7 @@ mod technique;
 #[cfg(test)]
 mod testing;
 mod tlas;
+mod visibility;
 mod warp;
 
 /// The example of the README.
@@ -168,6 +169,7 @@ pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
 pub use record::{Filter, Hit, LightId, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
-    ResampledLight,
+    ResampledLight, VisibilityCounters, VisibilityLearner,
 };
 pub use tlas::{Arity, Splitting};
+pub use visibility::{Visibility, VisibilityView};

@@ -16,4 +16,4 @@ pub use arity::Arity;
 pub(crate) use build::build;
 pub(crate) use tree::{MAX_LEAVES, Tlas, TlasView};
 pub use walk::Splitting;
-pub(crate) use walk::{Beam, Descent, FirstWeights, INTERLEAVED, LeafOracle, Outgoing};
+pub(crate) use walk::{Beam, Descent, FACTORS, FactorBytes, FirstWeights, INTERLEAVED, LeafOracle, Outgoing, factor};

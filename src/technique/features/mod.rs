@@ -65,8 +65,9 @@ impl VisibleFeatures {
             let view = &at.view(leaf);
             let Some(triangle) = view.as_ref().and_then(LightView::as_portal) else { return };
             self.note(triangle.is_close());
+            let known = at.feature_factor(leaf);
             FeatureView::new(triangle, environment, node as usize).visit(|part, through| {
-                let weight = through * scale * cosine;
+                let weight = through * scale * cosine * known;
                 if self.len() < end {
                     self.push(leaf, node, part, weight);
                 }

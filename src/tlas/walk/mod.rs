@@ -6,6 +6,7 @@
 mod beam;
 pub(in crate::tlas) mod descend;
 mod importance;
+mod learned;
 pub(in crate::tlas) mod ray;
 mod shaped;
 mod split;
@@ -15,6 +16,7 @@ use glam::Vec3;
 pub(crate) use beam::{Beam, Outgoing};
 pub(crate) use descend::{Descent, FirstWeights, INTERLEAVED};
 pub(crate) use importance::LeafOracle;
+pub(crate) use learned::{FACTORS, FactorBytes, factor};
 pub use split::Splitting;
 
 use crate::receiver::Lobe;
