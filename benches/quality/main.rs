@@ -9,6 +9,7 @@
 //! method's name: `fanlight` samples the holes of `grid-100`, `fanlight@clip-map` one quad with a clip map.
 
 mod args;
+mod building;
 mod comparison;
 mod fairness;
 #[path = "../instruction_set.rs"]
@@ -66,7 +67,8 @@ fn run(args: &Args) -> Result<(), Failure> {
 /// All workloads and methods that are asked for.
 fn table(args: &Args) -> Result<(), Failure> {
     report::print_head();
-    let rows: Vec<Row> = scenes::NAMES.iter().flat_map(|name| comparison::run(name, args)).collect();
+    let mut rows: Vec<Row> = scenes::NAMES.iter().flat_map(|name| comparison::run(name, args)).collect();
+    rows.extend(building::NAMES.iter().flat_map(|name| building::run(name, args)));
     if rows.is_empty() {
         return Err(format!("no workload and method of these names; workloads are {}", scenes::workloads()).into());
     }

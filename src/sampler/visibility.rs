@@ -32,7 +32,7 @@ const MAX_REGIONS: usize = 1 << 13;
 const DIVIDED: u64 = 512;
 
 /// Rays of a region, where space is divided before they are traced. *Measured* on `building` (docs/CONSTANTS.md).
-const RAYS_IN_REGION: u64 = 192;
+const RAYS_IN_REGION: u64 = 96;
 
 /// Largest number of points that regions are divided by. *Chosen*: memory and time of a fraction of a second.
 const COVERING_POINTS: u64 = 1 << 17;
@@ -40,6 +40,13 @@ const COVERING_POINTS: u64 = 1 << 17;
 /// Shares of the rays of all passes, of which each uses what the ones before have found. *Measured* on `building`
 /// (docs/CONSTANTS.md).
 const PASSES: [f64; 3] = [0.25, 0.25, 0.5];
+
+/// Share of the rays of all passes but the first that are drawn as if nothing had been learned. *Measured* on `building`
+/// (docs/CONSTANTS.md).
+///
+/// Larger: more rays to what is hidden. Smaller: what is hidden by the table is asked about seldom, and each report stands for
+/// more, up to the inverse of this.
+const UNLEARNED: f64 = 0.5;
 
 /// Rays that are counted together. *Chosen*: it decides about memory and waiting, not about results.
 const CHUNK: u64 = 1 << 13;
@@ -163,6 +170,8 @@ pub struct VisibilityCounters {
     regions: RegionBuilder,
     counts: Counts,
     generation: u32,
+    /// Share of the samples that were drawn without a table, whatever table they are reported with.
+    unlearned_share: f64,
 }
 
 impl VisibilityCounters {
@@ -192,6 +201,7 @@ impl VisibilityCounters {
                         // table has left of them.
                         let drawn = scene.tlas.pmf(leaf, &here.at, None);
                         let unlearned = scene.tlas.pmf(leaf, &here.at.unlearned(), None);
+                        let drawn = self.unlearned_share * unlearned + (1.0 - self.unlearned_share) * drawn;
                         weight = if drawn > 0.0 { (unlearned / drawn) as f32 } else { 1.0 };
                     }
                     LeafKey::leaf(leaf)
@@ -261,7 +271,13 @@ impl VisibilityLearner {
     #[must_use]
     pub fn counters(&self) -> VisibilityCounters {
         let (header, regions, generation) = (self.header, self.regions.clone(), self.generation);
-        VisibilityCounters { header, regions: regions.without_reports(), counts: Counts::default(), generation }
+        VisibilityCounters {
+            header,
+            regions: regions.without_reports(),
+            counts: Counts::default(),
+            generation,
+            unlearned_share: 0.0,
+        }
     }
 
     /// Adds all reports of counters. The order does not matter.
@@ -313,7 +329,7 @@ impl VisibilityLearner {
                 Some(new) => records.extend([record.region, new].map(|region| record.faded(region))),
             }
         }
-        records.retain(|record| record.reports > 0);
+        records.retain(|record| record.asked > 0 && record.squares > 0);
         self.counts.replace(records);
     }
 }
@@ -324,8 +340,8 @@ impl Visibility {
     /// `points(i)` is the i-th point that light is gathered at, for any `i` below `rays`: for example a random point on a random
     /// surface, or a list that is repeated. The regions of the table are where these points are. `transmittance` says which
     /// share, in `[0, 1]`, of the light of a sample gets to such a point: for a sample on a portal or of the environment, of the
-    /// light that comes along its direction. Each of the `rays` asks for it once, half of them for samples drawn with what the
-    /// others have found. One hundred rays for each region of a square meter or so make a useful table, one thousand a good one.
+    /// light that comes along its direction. Each of the `rays` asks for it once, many of them for samples drawn with what the
+    /// ones before have found. One hundred rays for each region of a square meter or so make a useful table, one thousand a good one.
     ///
     /// The result does not depend on the number of threads. With the feature `rayon` both functions are called by several.
     ///
@@ -387,12 +403,15 @@ fn learn(
             let counted = parallel::map(&chunks, 2, |&start| {
                 progress.check()?;
                 let mut counters = learner.counters();
+                counters.unlearned_share = if pass == 0 { 1.0 } else { UNLEARNED };
                 let rays = start..batch_end.min(start + CHUNK);
                 progress.add((rays.end - rays.start) as usize);
                 for ray in rays {
                     let x = points(ray);
                     let here = lights.at(&x);
-                    if let Some(sample) = here.sample(numbers(ray)) {
+                    let [choice, u @ ..] = numbers(ray);
+                    let drawn = if f64::from(choice) < UNLEARNED { unlearned.at(&x).sample(u) } else { here.sample(u) };
+                    if let Some(sample) = drawn {
                         counters.report(&here, &sample, transmittance(&x, &sample));
                     }
                 }
@@ -427,11 +446,11 @@ impl VisibilityLearner {
     }
 }
 
-/// Returns the numbers that the sample of a ray is drawn with: hashes of its number (the finalizer of SplitMix64, Steele, Lea
+/// Returns the numbers that a ray is drawn with, first the choice of the table: hashes of its number (the finalizer of SplitMix64, Steele, Lea
 /// and Flood 2014).
-fn numbers(ray: u64) -> [f32; 3] {
-    [0, 1, 2].map(|dimension| {
-        let mut bits = (3 * ray + dimension + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+fn numbers(ray: u64) -> [f32; 4] {
+    [0, 1, 2, 3].map(|dimension| {
+        let mut bits = (ray.wrapping_mul(4) + dimension + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
         (bits >> 40) as f32 * (1.0 / 16_777_216.0)

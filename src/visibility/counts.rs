@@ -31,16 +31,16 @@ pub(crate) const UNIT: f32 = 64.0;
 /// Largest weight of a report. *Chosen*: one report stands for so many at most.
 ///
 /// Larger: single reports speak too loud. Smaller: what a table already hides is overrated.
-const MAX_WEIGHT: f32 = 16.0;
+const MAX_WEIGHT: f32 = 4.0;
 
 /// All reports of one leaf in one region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Record {
     pub(crate) region: u32,
     pub(crate) leaf: LeafKey,
-    /// Number of reports.
-    pub(crate) reports: u32,
-    /// Sum of their weights, and of the weights times the transmittances, in units.
+    /// Sum of the squares of the weights of all reports, in units.
+    pub(crate) squares: u32,
+    /// Sum of the weights, and of the weights times the transmittances, in units.
     pub(crate) asked: u32,
     pub(crate) seen: u32,
 }
@@ -52,14 +52,14 @@ impl Record {
 
     /// Adds another record. Saturating sums of what is not negative do not depend on the order.
     pub(crate) fn add(&mut self, other: &Self) {
-        self.reports = self.reports.saturating_add(other.reports);
+        self.squares = self.squares.saturating_add(other.squares);
         self.asked = self.asked.saturating_add(other.asked);
         self.seen = self.seen.saturating_add(other.seen);
     }
 
     /// Returns the same with a fourth of the counts.
     pub(crate) fn faded(self, region: u32) -> Self {
-        Self { region, reports: self.reports / 4, asked: self.asked / 4, seen: self.seen / 4, ..self }
+        Self { region, squares: self.squares / 4, asked: self.asked / 4, seen: self.seen / 4, ..self }
     }
 }
 
@@ -81,7 +81,8 @@ impl Counts {
         let weight = crate::math::limit(weight, MAX_WEIGHT);
         let asked = ((weight * UNIT + 0.5) as u32).max(1);
         let seen = (crate::math::limit(transmittance, 1.0) * asked as f32 + 0.5) as u32;
-        self.push(Record { region, leaf, reports: 1, asked, seen: seen.min(asked) });
+        let squares = ((weight * weight * UNIT + 0.5) as u32).max(1);
+        self.push(Record { region, leaf, squares, asked, seen: seen.min(asked) });
     }
 
     pub(crate) fn push(&mut self, record: Record) {

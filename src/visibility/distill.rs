@@ -1,16 +1,23 @@
 //! From counts to factors: shares that got through, shrunk towards what is known of more.
 //!
-//! A report of a leaf counts for each lane on the way from the root to the leaf. The factor of a lane is the share of its
-//! reports that got through, as if [`PRIOR`] further reports had come out as expected. What is expected is the factor of the
-//! node itself, corrected by what the surrounding regions know: first a table is made of all reports of an orientation, then
-//! of ever smaller groups of regions, each with the one before as its prior.
+//! A report of a leaf counts for each lane on the way from the root to the leaf. The share `q` of a lane is the share of its
+//! reports that got through, as if [`PRIOR`] further reports had come out as expected. What is expected is the share of the
+//! node itself, corrected by what the surrounding regions know: first all reports of an orientation are looked at, then those of
+//! ever smaller groups of regions, each with the group before as its prior.
+//!
+//! The factor is the *root* of the share. A light that gets through to a part `q` of a region, and whose unhidden contribution
+//! is `f`, has the second moment `q f²` there. Over all lights, the expected square of the estimate `Σ q f² / p` is least for
+//! `p` in proportion to `f √q`. The factor of a lane with lanes below it is the mean of theirs, so that it says the same of a
+//! lamp behind a wall and one in the room as of both apart.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
-use super::counts::{Counts, LeafKey, Record};
+use super::counts::{Counts, LeafKey, Record, UNIT};
 use super::regions::RegionBuilder;
 use super::table::{Factors, ORIENTATIONS, Visibility, VisibilityHeader};
 use super::{FEATURES, SKY};
+use crate::math;
 use crate::tlas::{FACTORS as LANES, TlasView};
 
 /// Number of reports that the expectation counts as.
@@ -24,16 +31,28 @@ const PRIOR: f32 = 2.0;
 /// Larger: less time to publish, and a coarser prior. Smaller: the reverse.
 const PRIOR_LEVELS: u32 = 2;
 
-/// Least factor. A light that got through nowhere is still chosen this share as often as without a table.
+/// Least share. A light that got through nowhere is still chosen with the root of this, 0.7 %, of its weight without a table.
 ///
 /// *Measured* on `building` (docs/CONSTANTS.md). Larger: more samples of what is hidden. Smaller: what was missed while
-/// learning is noisier, by the inverse.
-const FLOOR: f32 = 1e-3;
+/// learning is noisier, by the inverse of the root.
+const FLOOR: f32 = 5e-5;
 
-/// Least gain of an entry, as a share of the reports of its region that would go to other lanes.
+/// Least gain of an entry: the part of the samples of its region that the entry moves.
 ///
 /// *Measured* on `building` (docs/CONSTANTS.md). Larger: a smaller table. Smaller: entries that change next to nothing.
-const LEAST_GAIN: f32 = 2e-4;
+const LEAST_GAIN: f32 = 5e-4;
+
+/// Number of reports that the prior counts as of how often lanes are asked about. *Measured* on `building`
+/// (docs/CONSTANTS.md).
+///
+/// Larger: factors of clusters are means over what a larger group of regions asks about. Smaller: over few reports.
+const PRIOR_MASS: f32 = 32.0;
+
+/// Least part of all reports from which on a lane is told apart from its siblings. *Measured* on `building`
+/// (docs/CONSTANTS.md).
+///
+/// Larger: faster to publish, and small lights are taken together. Smaller: the reverse.
+const LEAST_MASS: f32 = 2e-4;
 
 /// A lane: its node's key, and its number.
 type Slot = u64;
@@ -46,25 +65,49 @@ fn key_of(slot: Slot) -> u32 {
     (slot >> 4) as u32
 }
 
-/// What was counted of a lane.
+/// What was counted of a lane, in units of one report.
 #[derive(Clone, Copy, Debug)]
 struct Count {
     slot: Slot,
-    reports: f32,
+    squares: f32,
     asked: f32,
     seen: f32,
+}
+
+impl Count {
+    /// Number of reports of equal weight that say as much (Kish 1965).
+    fn reports(&self) -> f32 {
+        if self.squares > 0.0 { self.asked * self.asked / self.squares } else { 0.0 }
+    }
 }
 
 /// What is believed of the lanes of a group of regions, in order.
 #[derive(Clone, Debug, Default)]
 struct Beliefs {
-    slots: Vec<(Slot, f32)>,
+    slots: Vec<Belief>,
+}
+
+/// What is believed of a lane.
+#[derive(Clone, Copy, Debug)]
+struct Belief {
+    slot: Slot,
+    /// How often it is asked about, relative to all that is.
+    mass: f32,
+    /// Share of what is sent that gets through.
+    share: f32,
+    /// Factor of the weight.
+    factor: f32,
 }
 
 impl Beliefs {
-    fn get(&self, slot: Slot) -> Option<f32> {
-        let at = self.slots.binary_search_by_key(&slot, |(slot, _)| *slot).ok()?;
-        Some(self.slots[at].1)
+    fn get(&self, slot: Slot) -> Option<&Belief> {
+        let at = self.slots.binary_search_by_key(&slot, |belief| belief.slot).ok()?;
+        Some(&self.slots[at])
+    }
+
+    /// The lanes of each node.
+    fn nodes(&self) -> impl DoubleEndedIterator<Item = &[Belief]> {
+        self.slots.chunk_by(|a, b| key_of(a.slot) == key_of(b.slot))
     }
 }
 
@@ -145,14 +188,15 @@ impl Distiller<'_> {
         let mut counts: Vec<Count> = Vec::new();
         let mut from = 0;
         while let Some(first) = records.get(from) {
-            let mut sum = Record { reports: 0, asked: 0, seen: 0, ..*first };
+            let mut sum = Record { squares: 0, asked: 0, seen: 0, ..*first };
             while let Some(record) = records.get(from).filter(|record| record.leaf == sum.leaf) {
                 sum.add(record);
                 from += 1;
             }
             let mut push = |key: u32, lane: u32| {
-                let [reports, asked, seen] = [sum.reports, sum.asked, sum.seen].map(|count| count as f32);
-                counts.push(Count { slot: slot(key, lane), reports, asked, seen });
+                let [squares, asked, seen] =
+                    [sum.squares, sum.asked, sum.seen].map(|count| count as f32 * (1.0 / UNIT));
+                counts.push(Count { slot: slot(key, lane), squares, asked, seen });
             };
             let LeafKey(leaf) = sum.leaf;
             if leaf & SKY != 0 {
@@ -167,7 +211,7 @@ impl Distiller<'_> {
         counts.dedup_by(|from, to| {
             let is_same = from.slot == to.slot;
             if is_same {
-                to.reports += from.reports;
+                to.squares += from.squares;
                 to.asked += from.asked;
                 to.seen += from.seen;
             }
@@ -185,44 +229,83 @@ impl Distiller<'_> {
         Some(slot(node | key & FEATURES, lane))
     }
 
-    /// Shrinks the shares of all lanes, from the root downwards.
+    /// Forms beliefs from counts and from those of a larger group of regions.
     fn believe(&self, counts: &[Count], prior: Option<&Beliefs>) -> Beliefs {
-        let mut beliefs = Beliefs { slots: Vec::with_capacity(counts.len()) };
-        for of_node in counts.chunk_by(|a, b| key_of(a.slot) == key_of(b.slot)) {
-            let parent = self.parent(key_of(of_node[0].slot));
-            let above = parent.and_then(|parent| beliefs.get(parent)).unwrap_or_else(|| share(of_node));
-            let above_before = prior.and_then(|prior| prior.get(parent?));
-            for count in of_node {
-                let before = prior.and_then(|prior| prior.get(count.slot));
-                let expected = match (before, above_before) {
-                    (Some(before), Some(above_before)) => (before * (above / above_before)).min(1.0),
-                    (Some(before), None) => before,
-                    (None, _) => above,
-                };
-                let share = if count.asked > 0.0 { count.seen / count.asked } else { expected };
-                let factor = (share * count.reports + PRIOR * expected) / (count.reports + PRIOR);
-                beliefs.slots.push((count.slot, factor.clamp(FLOOR, 1.0)));
+        let all = self.asked(counts);
+        let mut beliefs = Beliefs { slots: union(counts, prior) };
+        let (mut first, mut counted) = (0, 0);
+        while let Some(Belief { slot, .. }) = beliefs.slots.get(first) {
+            let key = key_of(*slot);
+            let last = first + beliefs.slots[first..].partition_point(|belief| key_of(belief.slot) == key);
+            let end = counted + counts[counted..].partition_point(|count| key_of(count.slot) == key);
+            self.shrink(&mut beliefs, first..last, &counts[counted..end], all, prior);
+            (first, counted) = (last, end);
+        }
+        beliefs.slots.retain(|belief| belief.mass >= LEAST_MASS);
+        // The factor of a lane is the mean over what is below it, from the leaves upwards.
+        let mut end = beliefs.slots.len();
+        while end > 0 {
+            let key = key_of(beliefs.slots[end - 1].slot);
+            let start = beliefs.slots[..end].partition_point(|belief| key_of(belief.slot) < key);
+            let mean = mean_factor(&beliefs.slots[start..end]);
+            if let Some(parent) = self.parent(key) {
+                if let Ok(at) = beliefs.slots.binary_search_by_key(&parent, |belief| belief.slot) {
+                    beliefs.slots[at].factor = mean;
+                }
             }
+            end = start;
         }
         beliefs
     }
 
+    /// Forms the beliefs of one node's lanes, those above being known: shares that got through, shrunk towards what is
+    /// expected. `all` is the number of reports.
+    fn shrink(&self, beliefs: &mut Beliefs, lanes: Range<usize>, counts: &[Count], all: f32, prior: Option<&Beliefs>) {
+        let Some(first) = beliefs.slots.get(lanes.start) else { return };
+        let parent = self.parent(key_of(first.slot));
+        let above = parent.and_then(|parent| beliefs.get(parent)).map_or_else(|| share(counts), |above| above.share);
+        let above_before = prior.and_then(|prior| Some(prior.get(parent?)?.share));
+        let prior_mass = if prior.is_some() { PRIOR_MASS } else { 0.0 };
+        let mut counts = counts.iter().peekable();
+        for belief in &mut beliefs.slots[lanes] {
+            let before = prior.and_then(|prior| prior.get(belief.slot));
+            let expected = match (before, above_before) {
+                (Some(before), Some(above_before)) => (before.share * (above / above_before)).min(1.0),
+                (Some(before), None) => before.share,
+                (None, _) => above,
+            };
+            let mut mass = prior_mass * before.map_or(0.0, |before| before.mass);
+            belief.share = expected;
+            if let Some(count) = counts.next_if(|count| count.slot == belief.slot) {
+                let reports = count.reports();
+                belief.share = (count.seen / count.asked * reports + PRIOR * expected) / (reports + PRIOR);
+                mass += count.asked;
+            }
+            belief.share = belief.share.clamp(FLOOR, 1.0);
+            belief.factor = math::sqrt(belief.share);
+            belief.mass = mass / (all + prior_mass);
+        }
+    }
+
+    /// Number of reports by the lanes of all roots.
+    fn asked(&self, counts: &[Count]) -> f32 {
+        counts.iter().filter(|count| self.parent(key_of(count.slot)).is_none()).map(|count| count.asked).sum()
+    }
+
     /// Makes the entries of a region.
     fn add_entries(&self, region: u32, counts: &[Count], beliefs: &Beliefs, entries: &mut Vec<Entry>) {
-        let all: f32 = counts.iter().filter(|count| self.parent(key_of(count.slot)).is_none()).map(|c| c.asked).sum();
+        let all = self.asked(counts);
         let first = entries.len();
-        let mut from = 0;
-        for of_node in counts.chunk_by(|a, b| key_of(a.slot) == key_of(b.slot)) {
-            let believed = &beliefs.slots[from..from + of_node.len()];
-            from += of_node.len();
+        for of_node in beliefs.nodes() {
             let key = key_of(of_node[0].slot);
             let parent = self.parent(key);
-            let above = parent.and_then(|parent| beliefs.get(parent)).unwrap_or_else(|| share(of_node));
+            let above = parent.and_then(|parent| beliefs.get(parent));
+            let above = above.map_or_else(|| mean_factor(of_node), |above| above.factor);
             let mut factors = Factors([Factors::code(above); LANES]);
             let mut gain = 0.0;
-            for (count, (slot, factor)) in of_node.iter().zip(believed) {
+            for Belief { slot, mass, factor, .. } in of_node {
                 factors.0[(slot % LANES as u64) as usize] = Factors::code(*factor);
-                gain += count.asked * (factor - above).abs();
+                gain += mass * (factor - above).abs();
             }
             // The first entry says how much arrives at all.
             let gain = if parent.is_none() { f32::MAX } else { gain };
@@ -238,11 +321,11 @@ impl Distiller<'_> {
                 entry.gain = entry.gain.max(gain);
             }
         }
-        let least = LEAST_GAIN * all;
         let mut keep = first;
         for i in first..entries.len() {
-            if entries[i].gain > least {
+            if entries[i].gain > LEAST_GAIN {
                 entries.swap(keep, i);
+                entries[keep].gain *= all;
                 keep += 1;
             }
         }
@@ -277,4 +360,20 @@ impl Distiller<'_> {
 fn share(counts: &[Count]) -> f32 {
     let (asked, seen) = counts.iter().fold((0.0, 0.0), |(asked, seen), c| (asked + c.asked, seen + c.seen));
     if asked > 0.0 { (seen / asked).max(FLOOR) } else { 1.0 }
+}
+
+/// Mean factor of the lanes of a node, weighted by how often each is asked about.
+fn mean_factor(beliefs: &[Belief]) -> f32 {
+    let (sum, mass) = beliefs.iter().fold((0.0, 0.0), |(sum, mass), b| (sum + b.mass * b.factor, mass + b.mass));
+    if mass > 0.0 { sum / mass } else { 1.0 }
+}
+
+/// Returns the lanes of which there are counts or a prior, in order.
+fn union(counts: &[Count], prior: Option<&Beliefs>) -> Vec<Belief> {
+    let prior = prior.map_or(&[][..], |prior| &prior.slots);
+    let all = counts.iter().map(|count| count.slot).chain(prior.iter().map(|belief| belief.slot));
+    let mut slots: Vec<Belief> = all.map(|slot| Belief { slot, mass: 0.0, share: 1.0, factor: 1.0 }).collect();
+    slots.sort_unstable_by_key(|belief| belief.slot);
+    slots.dedup_by_key(|belief| belief.slot);
+    slots
 }

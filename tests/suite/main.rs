@@ -33,3 +33,4 @@ mod refit;
 mod selection;
 mod stress;
 mod suns;
+mod visibility;
