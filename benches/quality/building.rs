@@ -82,9 +82,6 @@ pub(crate) fn run(name: &str, args: &Args) -> Vec<Row> {
     }
     if wanted(METHODS[1]) {
         let rays = if args.quick { &[20 * args.effort.points as u64][..] } else { &RAYS };
-        let one = std::env::var("RAYS").ok().and_then(|r| r.parse().ok());
-        let one: Vec<u64> = one.into_iter().collect();
-        let rays = if one.is_empty() { rays } else { &one[..] };
         for &rays in rays {
             let start = Instant::now();
             let visibility = building.learn(rays);

@@ -10,12 +10,14 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Scene, random_point};
 use crate::kinds::{mixed, pdf_again};
-use fanlight::{LightSample, LightSampler, MeshId, ShadingPoint, Splitting, TriangleId};
+use fanlight::{LightSample, LightSampler, MeshId, ShadingPoint, Splitting, TriangleId, Visibility};
 
 const SCENES: usize = 70;
 const POINTS: usize = 60;
 /// Scenes that mix all kinds of lights.
 const KINDS: usize = 12;
+/// Scenes with learned visibility.
+const LEARNED: usize = 6;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// The same scenes at points with lobes.
@@ -120,6 +122,30 @@ fn line_of_kinds(number: usize) -> String {
     format!("{number:2} kinds {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene with learned visibility: the table as well as samples.
+fn line_of_learned(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let scene = random_scene(number + 1, &mut pcg);
+    let lights = build(&scene, ARITIES[number % ARITIES.len()]);
+    let point = |i: u64| random_point(&mut Pcg32::new(i, 84), i as usize);
+    let seen =
+        |x: &ShadingPoint, sample: &LightSample| f32::from(u8::from((x.position.x > 0.5) == (sample.position.x > 0.5)));
+    let table = Visibility::learn(&lights.as_view(), 2000, point, seen).expect("nobody cancels");
+    let view = lights.with_visibility(&table).expect("it was learned here");
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    table.to_bytes().chunks_exact(4).for_each(|word| hash.add(&[bytemuck::pod_read_unaligned(word)]));
+    for i in 0..POINTS {
+        let x = random_point(&mut pcg, i);
+        let at = view.at(&x);
+        if let Some(sample) = at.sample(pcg.cube()) {
+            drawn += 1;
+            hash.add_sample(&sample);
+            hash.add(&[at.pdf(&sample.hit().expect("a triangle")), at.pdf_sample_direction(&sample)]);
+        }
+    }
+    format!("{number:2} learned {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -132,9 +158,13 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let kinds = if has_lobes { 0 } else { KINDS };
-    let line = |i| if i < SCENES { line(i, has_lobes) } else { line_of_kinds(i - SCENES) };
-    let found = parallel::map(SCENES + kinds, line).concat();
+    let (kinds, learned) = if has_lobes { (0, 0) } else { (KINDS, LEARNED) };
+    let line = |i| match i {
+        i if i < SCENES => line(i, has_lobes),
+        i if i < SCENES + kinds => line_of_kinds(i - SCENES),
+        i => line_of_learned(i - SCENES - kinds),
+    };
+    let found = parallel::map(SCENES + kinds + learned, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {
         std::fs::write(&path, found).expect("the list can be written");
         panic!("{} is written, and nothing was compared", path.display());
