@@ -24,7 +24,7 @@ const DEFAULT_BYTES: usize = 3 << 20;
 /// Largest number of regions. *Measured* on `building` (docs/CONSTANTS.md).
 ///
 /// Larger: shadows are followed more closely, each region from fewer reports. Smaller: the reverse.
-const MAX_REGIONS: usize = 1 << 13;
+const MAX_REGIONS: usize = 1 << 14;
 
 /// Reports from which on a region is divided, where they are made while rendering. *Chosen*.
 ///
@@ -35,7 +35,7 @@ const DIVIDED: u64 = 512;
 const RAYS_IN_REGION: u64 = 96;
 
 /// Largest number of points that regions are divided by. *Chosen*: memory and time of a fraction of a second.
-const COVERING_POINTS: u64 = 1 << 17;
+const COVERING_POINTS: u64 = 1 << 18;
 
 /// Shares of the rays of all passes, of which each uses what the ones before have found. *Measured* on `building`
 /// (docs/CONSTANTS.md).
