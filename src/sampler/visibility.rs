@@ -34,6 +34,11 @@ const DIVIDED: u64 = 512;
 /// Rays of a region, where space is divided before they are traced. *Measured* on `building` (docs/CONSTANTS.md).
 const RAYS_IN_REGION: u64 = 96;
 
+/// Rays for each of the points that regions are divided by. *Chosen*: points may cost as much as rays.
+///
+/// Larger: regions differ more in the number of their rays. Smaller: more points are asked for.
+const COVERED_RAYS: u64 = 4;
+
 /// Largest number of points that regions are divided by. *Chosen*: memory and time of a fraction of a second.
 const COVERING_POINTS: u64 = 1 << 18;
 
@@ -430,7 +435,7 @@ fn learn(
 impl VisibilityLearner {
     /// Divides regions by where points are, before there are any reports.
     fn cover(&mut self, rays: u64, points: &impl Fn(u64) -> ShadingPoint) {
-        let count = rays.min(COVERING_POINTS);
+        let count = rays.div_ceil(COVERED_RAYS).min(COVERING_POINTS);
         let places = (0..count).map(|i| {
             let x = points(i);
             (orientation(&x.receiver), x.position)
