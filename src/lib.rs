@@ -83,7 +83,7 @@
 //! Out of scope:
 //!
 //! - intersecting the host's scene, and visibility. (Rays are intersected with lights only, for the density of a
-//!   direction.)
+//!   direction. What a host finds out about visibility can be learned: [`Visibility`].)
 //! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.

@@ -81,12 +81,20 @@ pub(crate) fn run(name: &str, args: &Args) -> Vec<Row> {
         rows.push(building.row(name, None, &points, args, build_ms));
     }
     if wanted(METHODS[1]) {
-        let rays = if args.quick { &[20 * args.effort.points as u64][..] } else { &RAYS };
+        let few = [20 * args.effort.points as u64];
+        let rays = match args {
+            args if args.effort.points < 50 => &few[..],
+            args if args.quick => &RAYS[..1],
+            _ => &RAYS[..],
+        };
         for &rays in rays {
             let start = Instant::now();
             let visibility = building.learn(rays);
             let build_ms = build_ms + start.elapsed().as_secs_f64() * 1e3;
             rows.push(building.row(name, Some((&visibility, rays)), &points, args, build_ms));
+            if let (Some(folder), true) = (&args.plots, name == NAMES[0] && rays == RAYS[0]) {
+                building.plan(&visibility, &folder.join("visibility.png"));
+            }
         }
     }
     rows.iter().for_each(report::print);
@@ -213,7 +221,7 @@ impl Building {
             lost: None,
             zero_rate: Some(1.0 - reach),
             nanoseconds: self.time(&lights, &points, args),
-            bytes: self.lights.bytes().total() + visibility.map_or(0, |(visibility, _)| visibility.bytes()),
+            bytes: lights.bytes().total(),
             build_ms,
             reach: Some(reach),
             rays_learned: Some(visibility.map_or(0.0, |(_, rays)| rays as f64)),
@@ -308,6 +316,39 @@ impl Building {
         let point = eye + direction * distance;
         let (along, z) = (point[1 - axis].rem_euclid(SIDE), point.z.rem_euclid(HEIGHT));
         ((along - 2.0).abs() < 0.6 && (1.0..2.2).contains(&z)).then_some((0, point))
+    }
+
+    /// Draws a plan of one story: how often one lamp is chosen at each place of the floor, without the table and with it.
+    fn plan(&self, visibility: &Visibility, path: &std::path::Path) {
+        const PIXELS: u32 = 12;
+        /// Number of the lamp, and its story.
+        const LAMP: (usize, f64) = (3 * (6 * 2 + 2) + 1, 1.0);
+        let side = PIXELS * ROOMS * SIDE as u32;
+        let lamp = &self.meshes[LAMP.0];
+        let center = lamp.positions.iter().sum::<Vec3>() / lamp.positions.len() as f32;
+        let known = self.lights.with_visibility(visibility).expect("it was learned here");
+        let id = MeshId::from_index(LAMP.0 as u32);
+        let share = |lights: &LightSamplerView<'_>, x: f64, y: f64| {
+            let point = DVec3::new(x, y, HEIGHT * LAMP.1 + 0.001).as_vec3();
+            let here = lights.at(&ShadingPoint::surface(point, Vec3::Z));
+            (0..lamp.indices.len() as u32).map(|i| here.pmf(TriangleId::new(id, i))).sum::<f32>()
+        };
+        let mut image = image::RgbImage::new(2 * side + PIXELS, side);
+        for (panel, lights) in [self.lights.as_view(), known].iter().enumerate() {
+            for (i, j) in (0..side).flat_map(|j| (0..side).map(move |i| (i, j))) {
+                let [x, y] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(PIXELS));
+                let near = |at: f64| (at / SIDE - (at / SIDE).round()).abs() * SIDE * f64::from(PIXELS) < 0.6;
+                let is_wall = near(x) && !is_door(y, 0.0) || near(y) && !is_door(x, 0.0);
+                let radius = f64::from(center.x - x as f32).hypot(f64::from(center.y - y as f32));
+                let value = share(lights, x, y).sqrt();
+                let color = match () {
+                    () if is_wall || (radius - 0.25).abs() < 0.06 => [255, 255, 255],
+                    () => [value, value * value, 0.25 * value].map(|v| (255.0 * v.clamp(0.0, 1.0)) as u8),
+                };
+                image.put_pixel(i + panel as u32 * (side + PIXELS), side - 1 - j, image::Rgb(color));
+            }
+        }
+        image.save(path).expect("the picture can be written");
     }
 
     fn time(&self, lights: &LightSamplerView<'_>, points: &[ShadingPoint], args: &Args) -> Nanoseconds {

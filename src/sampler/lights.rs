@@ -51,13 +51,15 @@ pub struct ByteSizes {
     pub texture_trees: usize,
     /// Environment, and what it needs as a light.
     pub environment: usize,
+    /// What walls hide, where a view has it.
+    pub visibility: usize,
 }
 
 impl ByteSizes {
     /// Returns the sum of all parts.
     #[must_use]
     pub const fn total(&self) -> usize {
-        self.light_tree + self.lights + self.texture_trees + self.environment
+        self.light_tree + self.lights + self.texture_trees + self.environment + self.visibility
     }
 }
 
@@ -163,6 +165,7 @@ impl<'a> LightSamplerView<'a> {
             lights: self.scene.lights.byte_size() - texture_trees,
             texture_trees,
             environment: self.scene.environment.byte_size() + self.scene.sky.map_or(0, size_of_val),
+            visibility: self.visibility.map_or(0, |visibility| visibility.bytes()),
         }
     }
 }

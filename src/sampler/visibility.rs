@@ -77,7 +77,8 @@ impl<'a> LightSamplerView<'a> {
     /// exact for any table, whatever it holds: only noise depends on it. A density belongs to the sampler that it was asked of:
     /// do not mix those of samplers with different tables, or of one with and one without.
     ///
-    /// Rays of light that leave the lights ([`Self::emission`]) are drawn as without a table.
+    /// Rays of light that leave the lights ([`Self::emission`]) are drawn as without a table, and [`Self::to_bytes`] writes the
+    /// lights alone: a table has bytes of its own.
     ///
     /// # Errors
     ///

@@ -19,18 +19,10 @@ impl Viewpoint<'_> {
         self.visibility.as_ref()?.get(node).map(|factors| &factors.0)
     }
 
-    /// Returns the factor in `(0, 1]` for bright features that are seen through a portal.
-    #[inline]
-    pub(super) fn feature_factor(&self, leaf: u32) -> f32 {
-        match &self.visibility {
-            None => 1.0,
-            Some(region) => self.known_factor(region, leaf),
-        }
-    }
-
-    /// The nearest entry on the way from the leaf to the root: first of those for features, then of those for all.
+    /// Returns the factor in `(0, 1]` for bright features that are seen through a portal: that of the nearest entry on the way
+    /// from its leaf to the root, first of those for features, then of those for all.
     #[inline(never)]
-    fn known_factor(&self, region: &RegionFactors<'_>, leaf: u32) -> f32 {
+    pub(super) fn feature_factor(&self, region: &RegionFactors<'_>, leaf: u32) -> f32 {
         let (mut of_features, mut of_all) = (None, None);
         self.scene.tlas.visit_path(leaf, |node, lane| {
             let factor = |key: u32| region.get(key).map(|factors| factors.get(lane as usize));

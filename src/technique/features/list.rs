@@ -80,6 +80,16 @@ impl VisibleFeatures {
         self.push(ANY_PORTAL, node, FeaturePart::WHOLE, weight);
     }
 
+    /// Multiplies the irradiance through each portal by a factor. What has no portal stays.
+    #[inline(never)]
+    pub(super) fn dim(&mut self, factor: impl Fn(u32) -> f32) {
+        for (visible, weight) in self.visible.iter().zip(&mut self.weights) {
+            if visible.leaf != ANY_PORTAL {
+                *weight *= factor(visible.leaf);
+            }
+        }
+    }
+
     /// Returns the irradiance from all that is listed from `start` on.
     pub(super) fn irradiance_from(&self, start: usize) -> f32 {
         sum(&self.weights()[start..]) as f32

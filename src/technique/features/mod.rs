@@ -42,6 +42,9 @@ impl VisibleFeatures {
             // Every group after this one keeps a place.
             self.find_group(*group, MAX_VISIBLE - left, at);
         }
+        if let Some(region) = &at.visibility {
+            self.dim(|leaf| at.feature_factor(region, leaf));
+        }
     }
 
     /// Appends the parts of portals that a group of features is visible through, as long as there are fewer than `end`.
@@ -65,9 +68,8 @@ impl VisibleFeatures {
             let view = &at.view(leaf);
             let Some(triangle) = view.as_ref().and_then(LightView::as_portal) else { return };
             self.note(triangle.is_close());
-            let known = at.feature_factor(leaf);
             FeatureView::new(triangle, environment, node as usize).visit(|part, through| {
-                let weight = through * scale * cosine * known;
+                let weight = through * scale * cosine;
                 if self.len() < end {
                     self.push(leaf, node, part, weight);
                 }
