@@ -3,6 +3,7 @@
 use smallvec::SmallVec;
 
 use super::view::FeaturePart;
+use crate::math::{at_least, only_if};
 use crate::warp::sum;
 
 /// Most parts of portals that features are listed through. Of a feature with more parts, directions are drawn as if there
@@ -85,7 +86,9 @@ impl VisibleFeatures {
     pub(super) fn dim(&mut self, factor: impl Fn(u32) -> f32) {
         for (visible, weight) in self.visible.iter().zip(&mut self.weights) {
             if visible.leaf != ANY_PORTAL {
-                *weight *= factor(visible.leaf);
+                // Positive whatever underflows.
+                let dimmed = at_least(*weight * factor(visible.leaf), f32::MIN_POSITIVE);
+                *weight = only_if(*weight > 0.0, dimmed);
             }
         }
     }
