@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 use glam::Vec3;
 
 use super::table::{NOTHING, ORIENTATIONS, REGION, RegionNode, find};
+use crate::math;
 use crate::receiver::{Receiver, ReceiverKind};
 
 /// Returns the root that a receiver belongs to: that of the axis which is nearest to its normal, or the last one for a
@@ -177,7 +178,10 @@ impl RegionBuilder {
         for (root, around) in self.around.iter().enumerate() {
             let mut at = root;
             if around.count > 0 {
-                let margin = MARGIN * (around.high - around.low).max_element();
+                // Above rounding, so that reports of a single position have a region as well.
+                let size = around.low.abs().max(around.high.abs()).max_element();
+                let least = f32::EPSILON * size + f32::MIN_POSITIVE;
+                let margin = math::at_least(MARGIN * (around.high - around.low).max_element(), least);
                 let ends = [around.low - margin, around.high + margin];
                 for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
                     let first = nodes.len();
