@@ -186,7 +186,7 @@ impl Building {
         let points = |i: u64| {
             let mut pcg = Pcg32::new(i, 41);
             loop {
-                if let Some(point) = self.point(&mut pcg, i % 2 == 0) {
+                if let Some(point) = self.point(&mut pcg, i.is_multiple_of(2)) {
                     return point;
                 }
             }
