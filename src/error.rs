@@ -99,6 +99,8 @@ pub(crate) enum ErrorKind {
     SectionVersion { what: &'static str, found: u32, expected: u32 },
     /// Bytes with trees of an arity that this build does not walk.
     Arity { what: &'static str, found: u32, expected: &'static [u32] },
+    /// A table of visibility that was learned for another sampler.
+    Visibility { what: &'static str, found: usize, expected: usize },
     /// Bytes that do not hold what they should.
     Bytes { what: &'static str, at: usize, found: u64, expected: u64 },
 }
@@ -192,6 +194,9 @@ impl fmt::Display for Error {
                     write!(f, "{}{arity}", if i == 0 { "" } else { ", " })?;
                 }
                 Ok(())
+            }
+            ErrorKind::Visibility { what, found, expected } => {
+                write!(f, "visibility: it was learned for {found} {what}, but there are {expected}")
             }
             ErrorKind::Bytes { what, at, found, expected } => {
                 write!(f, "bytes: {what} at {at} is {found:#x}, expected {expected:#x}")

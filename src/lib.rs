@@ -84,7 +84,7 @@
 //! Out of scope:
 //!
 //! - intersecting the host's scene, and visibility. (Rays are intersected with lights only, for the density of a
-//!   direction.)
+//!   direction. What a host finds out about visibility can be learned: [`Visibility`].)
 //! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
@@ -145,6 +145,7 @@ mod technique;
 #[cfg(test)]
 mod testing;
 mod tlas;
+mod visibility;
 mod warp;
 
 /// The example of the README.
@@ -169,6 +170,7 @@ pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
 pub use record::{Filter, Hit, LightId, LightSample, MeshId, ProfileId, SampledLight, TextureId, TriangleId, Wrap};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler, RaySegment,
-    ResampledLight, SegmentSample, SegmentSampler,
+    ResampledLight, SegmentSample, SegmentSampler, VisibilityCounters, VisibilityLearner,
 };
 pub use tlas::{Arity, Splitting};
+pub use visibility::{Visibility, VisibilityView};

@@ -124,6 +124,8 @@ impl Results {
             nanoseconds: timing::Nanoseconds { lit: 0.0, all: 0.0, pdf: 0.0 },
             bytes: 0,
             build_ms: 0.0,
+            reach: None,
+            rays_learned: None,
         })
     }
 }

@@ -9,6 +9,7 @@
 //! method's name: `fanlight` samples the holes of `grid-100`, `fanlight@clip-map` one quad with a clip map.
 
 mod args;
+mod building;
 mod comparison;
 mod fairness;
 #[path = "../instruction_set.rs"]
@@ -66,7 +67,8 @@ fn run(args: &Args) -> Result<(), Failure> {
 /// All workloads and methods that are asked for.
 fn table(args: &Args) -> Result<(), Failure> {
     report::print_head();
-    let rows: Vec<Row> = scenes::NAMES.iter().flat_map(|name| comparison::run(name, args)).collect();
+    let mut rows: Vec<Row> = scenes::NAMES.iter().flat_map(|name| comparison::run(name, args)).collect();
+    rows.extend(building::NAMES.iter().flat_map(|name| building::run(name, args)));
     if rows.is_empty() {
         return Err(format!("no workload and method of these names; workloads are {}", scenes::workloads()).into());
     }
@@ -75,7 +77,8 @@ fn table(args: &Args) -> Result<(), Failure> {
         std::fs::write(path, report::json(&rows))?;
     }
     if let Some(directory) = &args.plots {
-        plot::scatter::draw(directory, &rows)?;
+        let is_drawn = |row: &&Row| !building::NAMES.contains(&row.workload.as_str());
+        plot::scatter::draw(directory, &rows.iter().filter(is_drawn).cloned().collect::<Vec<_>>())?;
     }
     report::check_nothing_is_lost(&rows)
 }

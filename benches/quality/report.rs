@@ -23,6 +23,10 @@ pub(crate) struct Row {
     pub(crate) nanoseconds: Nanoseconds,
     pub(crate) bytes: usize,
     pub(crate) build_ms: f64,
+    /// Share of samples that get through to the point, where walls are in between.
+    pub(crate) reach: Option<f64>,
+    /// Rays that visibility was learned by.
+    pub(crate) rays_learned: Option<f64>,
 }
 
 impl Row {
@@ -128,6 +132,8 @@ fn object(row: &Row) -> String {
         ("ns_pdf", Some(row.nanoseconds.pdf)),
         ("bytes", Some(row.bytes as f64)),
         ("build_ms", Some(row.build_ms)),
+        ("reach", row.reach),
+        ("rays_learned", row.rays_learned),
     ];
     for (key, value) in figures {
         write!(out, ", \"{key}\": {}", number(value)).expect("a string takes everything");

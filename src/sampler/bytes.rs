@@ -123,7 +123,7 @@ impl<'a> LightSamplerView<'a> {
         tlas.validate()?;
         lights.validate()?;
         Error::unless_equal("number of lights", lights.len(), tlas.leaves.len())?;
-        Ok(Self { scene: LightScene { tlas, lights, environment, sky } })
+        Ok(Self { scene: LightScene { tlas, lights, environment, sky }, visibility: None })
     }
 }
 

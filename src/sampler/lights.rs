@@ -13,6 +13,7 @@ use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
 use crate::technique::{LightScene, Viewpoint};
 use crate::tlas::Tlas;
+use crate::visibility::VisibilityView;
 
 /// All lights of a scene, ready to be sampled.
 ///
@@ -34,6 +35,8 @@ pub struct LightSampler {
 #[derive(Clone, Copy, Debug)]
 pub struct LightSamplerView<'a> {
     pub(super) scene: LightScene<'a>,
+    /// What walls hide, where the host has passed it in.
+    pub(super) visibility: Option<VisibilityView<'a>>,
 }
 
 /// Numbers of bytes that the structures of a sampler take.
@@ -48,13 +51,15 @@ pub struct ByteSizes {
     pub texture_trees: usize,
     /// Environment, and what it needs as a light.
     pub environment: usize,
+    /// What walls hide, where a view has it.
+    pub visibility: usize,
 }
 
 impl ByteSizes {
     /// Returns the sum of all parts.
     #[must_use]
     pub const fn total(&self) -> usize {
-        self.light_tree + self.lights + self.texture_trees + self.environment
+        self.light_tree + self.lights + self.texture_trees + self.environment + self.visibility
     }
 }
 
@@ -69,7 +74,8 @@ impl LightSampler {
     #[must_use]
     pub fn as_view(&self) -> LightSamplerView<'_> {
         let (tlas, lights, environment) = (self.tlas.view(), self.lights.view(), self.environment.as_view());
-        LightSamplerView { scene: LightScene { tlas, lights, environment, sky: self.sky.as_deref() } }
+        let scene = LightScene { tlas, lights, environment, sky: self.sky.as_deref() };
+        LightSamplerView { scene, visibility: None }
     }
 
     /// Returns the lights as seen from a shading point.
@@ -83,6 +89,7 @@ impl LightSampler {
                 sky: self.sky.as_deref(),
             },
             x: *x,
+            visibility: None,
         })
     }
 
@@ -134,7 +141,7 @@ impl<'a> LightSamplerView<'a> {
     /// Returns the lights as seen from a shading point.
     #[inline(always)]
     pub fn at(&self, x: &ShadingPoint) -> PointSampler<'a> {
-        PointSampler::new(Viewpoint { scene: self.scene, x: *x })
+        PointSampler::new(Viewpoint { scene: self.scene, x: *x, visibility: self.region(x) })
     }
 
     /// Returns the environment, for its own sampling.
@@ -158,6 +165,7 @@ impl<'a> LightSamplerView<'a> {
             lights: self.scene.lights.byte_size() - texture_trees,
             texture_trees,
             environment: self.scene.environment.byte_size() + self.scene.sky.map_or(0, size_of_val),
+            visibility: self.visibility.map_or(0, |visibility| visibility.bytes()),
         }
     }
 }

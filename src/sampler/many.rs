@@ -35,7 +35,11 @@ impl LightSamplerView<'_> {
         let mut points = SmallVec::<[[Variate; 2]; INTERLEAVED]>::new();
         for (x, u) in queries {
             let Variates { choice, point } = Variates::new(*u);
-            walks.push(Descent::new(Viewpoint { scene: self.scene, x: *x }, NoLobe, choice));
+            walks.push(Descent::new(
+                Viewpoint { scene: self.scene, x: *x, visibility: self.region(x) },
+                NoLobe,
+                choice,
+            ));
             points.push(point);
         }
         self.scene.tlas.sample_many(&mut walks);
@@ -46,7 +50,7 @@ impl LightSamplerView<'_> {
         // Without these, nothing but the point differs.
         let mut at = self.at(first);
         for (i, sample) in samples.iter_mut().enumerate().take(walks.len()) {
-            at.move_to(&queries[i].0);
+            at.move_to(&queries[i].0, self.region(&queries[i].0));
             *sample = walks[i].leaf().and_then(|chosen| at.sample_on(chosen, points[i]));
         }
     }

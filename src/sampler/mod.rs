@@ -11,6 +11,7 @@ mod point;
 mod refit;
 mod resample;
 mod segment;
+mod visibility;
 
 pub use builder::LightSamplerBuilder;
 pub use emission::{Emission, EmissionSample};
@@ -18,3 +19,4 @@ pub use lights::{ByteSizes, LightSampler, LightSamplerView};
 pub use point::PointSampler;
 pub use resample::ResampledLight;
 pub use segment::{RaySegment, SegmentSample, SegmentSampler};
+pub use visibility::{VisibilityCounters, VisibilityLearner};

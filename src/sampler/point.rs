@@ -10,6 +10,7 @@ use crate::receiver::ShadingPoint;
 use crate::record::{Hit, LightId, LightSample, SampledLight, TriangleId};
 use crate::technique::{DistantDirection, Drawn, Mixed, Mixture, SkyDirection, Variates, Viewpoint};
 use crate::tlas::Splitting;
+use crate::visibility::RegionFactors;
 use crate::warp::{Variate, seed};
 
 /// Distance of the positions of samples of the environment. Chosen: beyond the largest coordinate of a light, 1e9, and of a
@@ -116,8 +117,9 @@ impl<'a> PointSampler<'a> {
     }
 
     /// Moves the sampler to another shading point from which no bright feature is visible either.
-    pub(super) fn move_to(&mut self, x: &ShadingPoint) {
+    pub(super) fn move_to(&mut self, x: &ShadingPoint, visibility: Option<RegionFactors<'a>>) {
         self.at.x = *x;
+        self.at.visibility = visibility;
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] draws this point of this triangle. Zero where it

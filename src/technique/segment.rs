@@ -120,7 +120,7 @@ impl Distances {
     fn balance(&mut self, scene: &LightScene<'_>, groups: u32) {
         let middle = 0.5 * self.segment.stretch.length * self.segment.stretch.direction;
         let x = ShadingPoint::volume(self.segment.stretch.origin + middle).with_groups(groups);
-        let even = Viewpoint { scene: *scene, x }.irradiance_everywhere() * self.segment.reach();
+        let even = Viewpoint { scene: *scene, x, visibility: None }.irradiance_everywhere() * self.segment.reach();
         let total = self.sum + self.beams + even;
         let share = |own: f64| if own > 0.0 { LEAST_SHARE + (1.0 - 3.0 * LEAST_SHARE) * own / total } else { 0.0 };
         if total > 0.0 && total.is_finite() {
@@ -177,7 +177,8 @@ impl Distances {
             let (start, end) = (i as f64 * width, (i + 1) as f64 * width);
             let Stretch { origin, direction, .. } = self.segment.stretch;
             let position = origin + (0.5 * (start + end)) as f32 * direction;
-            let at = Viewpoint { scene: *scene, x: ShadingPoint::volume(position).with_groups(groups) };
+            let x = ShadingPoint::volume(position).with_groups(groups);
+            let at = Viewpoint { scene: *scene, x, visibility: None };
             let first = scene.tlas.first_weights(&at);
             self.fill(start, end, trees::irradiance(&at, first.as_ref()));
         }

@@ -62,7 +62,10 @@ impl Sky {
         let environment = &at.scene.environment;
         let local = |normal: Vec3| Vec3::from_array(environment.local_vector(normal.to_array()));
         let receiver = at.x.receiver.map(local);
-        let sums = InstructionSet::best().run(WeighRegions { regions, receiver });
+        let mut sums = InstructionSet::best().run(WeighRegions { regions, receiver });
+        if at.visibility.is_some() {
+            at.dim_sky(&mut sums);
+        }
         (sums.total() > 0.0).then_some(Self { sums, receiver })
     }
 

@@ -8,7 +8,8 @@ use crate::env::{EnvironmentView, RegionMoments};
 use crate::light::{LightKind, LightPoint, LightView, LightsView};
 use crate::math::{at_least, only_if};
 use crate::receiver::ShadingPoint;
-use crate::tlas::{LeafOracle, TlasView};
+use crate::tlas::{FactorBytes, LeafOracle, TlasView};
+use crate::visibility::RegionFactors;
 
 /// The lights of a scene with the structures over them, all borrowed.
 #[derive(Clone, Copy, Debug)]
@@ -64,6 +65,8 @@ impl<'a> LightScene<'a> {
 pub(crate) struct Viewpoint<'a> {
     pub(crate) scene: LightScene<'a>,
     pub(crate) x: ShadingPoint,
+    /// What is known of what walls hide from the region of the point.
+    pub(crate) visibility: Option<RegionFactors<'a>>,
 }
 
 /// Largest coordinate of a position at which anything arrives. *Format*: documented at
@@ -133,5 +136,15 @@ impl LeafOracle for Viewpoint<'_> {
 
     fn irradiance_per_area(&self, leaf: u32) -> f32 {
         self.scene.lights.light(leaf).irradiance_per_area(&self.x)
+    }
+
+    #[inline(always)]
+    fn has_factors(&self) -> bool {
+        self.visibility.is_some()
+    }
+
+    #[inline(always)]
+    fn factors(&self, node: u32) -> Option<&FactorBytes> {
+        self.node_factors(node)
     }
 }

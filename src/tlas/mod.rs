@@ -19,5 +19,6 @@ pub(crate) use build::build_in_groups;
 pub(crate) use tree::{MAX_LEAVES, Tlas, TlasView};
 pub use walk::Splitting;
 pub(crate) use walk::{
-    Beam, ClusterAlong, ClusterMoments, Clusters, Descent, FirstWeights, INTERLEAVED, LeafOracle, Outgoing, Stretch,
+    Beam, ClusterAlong, ClusterMoments, Clusters, Descent, FACTORS, FactorBytes, FirstWeights, INTERLEAVED, LeafOracle,
+    Outgoing, Stretch, factor,
 };

@@ -54,6 +54,14 @@ impl LeafOracle for Before<'_> {
         false
     }
 
+    fn has_factors(&self) -> bool {
+        false
+    }
+
+    fn factors(&self, _node: u32) -> Option<&super::FactorBytes> {
+        None
+    }
+
     fn is_visible(&self, leaf: u32) -> bool {
         !self.odd_alone || leaf % 2 == 1
     }

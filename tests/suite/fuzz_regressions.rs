@@ -26,6 +26,11 @@ fn random_bytes() {
     inputs(tier().inputs).for_each(|input| checks::bytes(&input));
 }
 
+#[test]
+fn random_bytes_of_visibility() {
+    inputs(tier().inputs / 2).for_each(|input| checks::visibility(&input));
+}
+
 /// Sends to both sides of z = 0.
 fn one_triangle() -> LightSampler {
     let mut builder = LightSampler::builder();

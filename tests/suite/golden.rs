@@ -11,7 +11,7 @@ use crate::common::pcg::Pcg32;
 use crate::common::scene::{Scene, random_point};
 use crate::groups::scene as grouped;
 use crate::kinds::{mixed, pdf_again};
-use fanlight::{LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId};
+use fanlight::{LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId, Visibility};
 use glam::Vec3;
 
 const SCENES: usize = 70;
@@ -20,9 +20,13 @@ const POINTS: usize = 60;
 const KINDS: usize = 12;
 /// Scenes with light groups, profiles and distant lights.
 const GROUPS: usize = 6;
+/// Scenes with learned visibility.
+const LEARNED: usize = 6;
 
 /// End of the scenes that mix all kinds.
 const LAST_KIND: usize = SCENES + KINDS;
+/// End of the scenes with light groups.
+const LAST_GROUPS: usize = LAST_KIND + GROUPS;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// The same scenes at points with lobes.
@@ -156,6 +160,30 @@ fn line_of_groups(number: usize) -> String {
     format!("{number:2} groups {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene with learned visibility: the table as well as samples.
+fn line_of_learned(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let scene = random_scene(number + 1, &mut pcg);
+    let lights = build(&scene, ARITIES[number % ARITIES.len()]);
+    let point = |i: u64| random_point(&mut Pcg32::new(i, 84), i as usize);
+    let seen =
+        |x: &ShadingPoint, sample: &LightSample| f32::from(u8::from((x.position.x > 0.5) == (sample.position.x > 0.5)));
+    let table = Visibility::learn(&lights.as_view(), 2000, point, seen).expect("nobody cancels");
+    let view = lights.with_visibility(&table).expect("it was learned here");
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    table.to_bytes().chunks_exact(4).for_each(|word| hash.add(&[bytemuck::pod_read_unaligned(word)]));
+    for i in 0..POINTS {
+        let x = random_point(&mut pcg, i);
+        let at = view.at(&x);
+        if let Some(sample) = at.sample(pcg.cube()) {
+            drawn += 1;
+            hash.add_sample(&sample);
+            hash.add(&[at.pdf(&sample.hit().expect("a triangle")), at.pdf_sample_direction(&sample)]);
+        }
+    }
+    format!("{number:2} learned {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -168,11 +196,12 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let more = if has_lobes { 0 } else { KINDS + GROUPS };
+    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED };
     let line = |i| match i {
         0..SCENES => line(i, has_lobes),
         SCENES..LAST_KIND => line_of_kinds(i - SCENES),
-        _ => line_of_groups(i - LAST_KIND),
+        LAST_KIND..LAST_GROUPS => line_of_groups(i - LAST_KIND),
+        _ => line_of_learned(i - LAST_GROUPS),
     };
     let found = parallel::map(SCENES + more, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {

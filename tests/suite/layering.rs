@@ -8,7 +8,7 @@ const LEVELS: [&[&str]; 6] = [
     &["error", "math", "simd", "geometry", "parallel", "progress", "buffers"],
     &["record", "receiver", "bounds", "warp"],
     &["env", "blas", "tlas"],
-    &["light"],
+    &["light", "visibility"],
     &["technique"],
     &["sampler"],
 ];

@@ -37,3 +37,4 @@ mod segments;
 mod selection;
 mod stress;
 mod suns;
+mod visibility;

@@ -29,6 +29,22 @@ pub(crate) fn render_pass<L: Lighting>(
     }
 }
 
+/// Returns a random vertex of a random path. `None` where the path has left the scene.
+pub(crate) fn random_vertex(world: &World, bounces: u32, random: &mut Pcg32) -> Option<Vertex> {
+    let [width, height] = RESOLUTION.map(|side| side as f32);
+    let [x, y] = random.uniform2();
+    let mut vertex = first_vertex(world, Vec2::new(width * x, height * y).floor(), random)?;
+    // The first vertex as often as all others together.
+    let steps = if random.uniform() < 0.5 { 0 } else { (random.uniform() * bounces as f32) as u32 };
+    for _ in 0..steps {
+        match world.trace(vertex.position, vertex.sample(random)) {
+            Meeting::Surface(next) => vertex = next,
+            Meeting::Emitter(_) | Meeting::Sky => break,
+        }
+    }
+    Some(vertex)
+}
+
 /// Returns what is seen through a random point of a pixel. Emitters do not show: the camera sees what is behind them, and
 /// `None` where that is the sky.
 pub(crate) fn first_vertex(world: &World, corner: Vec2, random: &mut Pcg32) -> Option<Vertex> {

@@ -3,6 +3,7 @@
 use smallvec::SmallVec;
 
 use super::view::FeaturePart;
+use crate::math::{at_least, only_if};
 use crate::warp::sum;
 
 /// Most parts of portals that features are listed through. Of a feature with more parts, directions are drawn as if there
@@ -78,6 +79,18 @@ impl VisibleFeatures {
     pub(super) fn merge(&mut self, start: usize, node: u32, weight: f32) {
         self.truncate(start);
         self.push(ANY_PORTAL, node, FeaturePart::WHOLE, weight);
+    }
+
+    /// Multiplies the irradiance through each portal by a factor. What has no portal stays.
+    #[inline(never)]
+    pub(super) fn dim(&mut self, factor: impl Fn(u32) -> f32) {
+        for (visible, weight) in self.visible.iter().zip(&mut self.weights) {
+            if visible.leaf != ANY_PORTAL {
+                // Positive whatever underflows.
+                let dimmed = at_least(*weight * factor(visible.leaf), f32::MIN_POSITIVE);
+                *weight = only_if(*weight > 0.0, dimmed);
+            }
+        }
     }
 
     /// Returns the irradiance from all that is listed from `start` on.

@@ -42,6 +42,9 @@ impl VisibleFeatures {
             // Every group after this one keeps a place.
             self.find_group(*group, MAX_VISIBLE - left, at);
         }
+        if let Some(region) = &at.visibility {
+            self.dim(|leaf| at.feature_factor(region, leaf));
+        }
     }
 
     /// Appends the parts of portals that a group of features is visible through, as long as there are fewer than `end`.

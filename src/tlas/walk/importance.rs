@@ -14,6 +14,7 @@
 
 use glam::Vec3;
 
+use super::learned::FactorBytes;
 use crate::math::{self, at_least, only_if};
 use crate::receiver::{LEAST_CLUSTER_COSINE, Lobe, ReceiverLanes, ShadingPoint};
 use crate::tlas::node::{ALL, Child, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
@@ -43,6 +44,12 @@ pub(crate) trait LeafOracle {
     /// Returns the irradiance from a leaf of unit radiance, per area of it. Rounding may make it zero. Asked only of leaves
     /// near the shading point.
     fn irradiance_per_area(&self, leaf: u32) -> f32;
+
+    /// Whether anything is known of what walls hide from the shading point.
+    fn has_factors(&self) -> bool;
+
+    /// Returns what is known of the children of a node, as bytes that stand for factors ([`factor`](super::learned::factor)).
+    fn factors(&self, node: u32) -> Option<&FactorBytes>;
 }
 
 impl<O: LeafOracle> LeafOracle for &O {
@@ -69,6 +76,16 @@ impl<O: LeafOracle> LeafOracle for &O {
     #[inline(always)]
     fn irradiance_per_area(&self, leaf: u32) -> f32 {
         (**self).irradiance_per_area(leaf)
+    }
+
+    #[inline(always)]
+    fn has_factors(&self) -> bool {
+        (**self).has_factors()
+    }
+
+    #[inline(always)]
+    fn factors(&self, node: u32) -> Option<&FactorBytes> {
+        (**self).factors(node)
     }
 }
 
@@ -128,7 +145,7 @@ impl<const N: usize> WideTree<'_, N> {
     #[inline(always)]
     pub(super) fn weights(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> [f32; N] {
         let node = &self.nodes[index];
-        let mut estimates = node.asked(x, oracle);
+        let mut estimates = node.asked(index, x, oracle);
         if !self.groups.is_empty() {
             estimates = self.within_groups(index, oracle.shading_point().groups, estimates);
         }
@@ -138,7 +155,10 @@ impl<const N: usize> WideTree<'_, N> {
                 let lane = opened.trailing_zeros();
                 opened &= opened - 1;
                 let child = node.first_node.wrapping_add(lane);
-                weights[lane as usize] = self.opened(child as usize, x, oracle);
+                let sum = self.opened(child as usize, x, oracle);
+                let is_known = oracle.has_factors();
+                weights[lane as usize] =
+                    if is_known { self.inherited(index, lane, child as usize, oracle, sum) } else { sum };
             }
             largest = weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()));
         }
@@ -149,7 +169,7 @@ impl<const N: usize> WideTree<'_, N> {
     /// Returns the sum of the weights of a node's children.
     #[inline(always)]
     fn opened(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> f32 {
-        let mut estimates = self.nodes[index].asked(x, oracle);
+        let mut estimates = self.nodes[index].asked(index, x, oracle);
         if !self.groups.is_empty() {
             estimates = self.within_groups(index, oracle.shading_point().groups, estimates);
         }
@@ -161,7 +181,7 @@ impl<const N: usize> WideTree<'_, N> {
 impl<const N: usize> Node<N> {
     /// Estimates all lanes, and asks the oracle about what is in doubt and what portals show.
     #[inline(always)]
-    fn asked(&self, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> Estimates<N> {
+    fn asked(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> Estimates<N> {
         let mut estimates = self.estimates(x);
         if oracle.has_shaped_leaves() {
             // By value: what is referred to is kept in memory.
@@ -173,6 +193,9 @@ impl<const N: usize> Node<N> {
         }
         if { self.portals } != [0; N] {
             estimates.largest = self.look_through(x, oracle, &mut estimates.weights);
+        }
+        if oracle.has_factors() {
+            self.dim(index, oracle, &mut estimates);
         }
         estimates
     }

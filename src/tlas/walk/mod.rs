@@ -7,6 +7,7 @@ mod beam;
 pub(in crate::tlas) mod descend;
 mod groups;
 mod importance;
+mod learned;
 pub(in crate::tlas) mod ray;
 mod segment;
 mod shaped;
@@ -17,6 +18,7 @@ use glam::Vec3;
 pub(crate) use beam::{Beam, Outgoing};
 pub(crate) use descend::{Descent, FirstWeights, INTERLEAVED};
 pub(crate) use importance::LeafOracle;
+pub(crate) use learned::{FACTORS, FactorBytes, factor};
 pub(crate) use segment::{ClusterAlong, ClusterMoments, Clusters, Stretch};
 pub use split::Splitting;
 

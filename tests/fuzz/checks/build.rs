@@ -3,8 +3,9 @@
 use std::sync::OnceLock;
 
 use fanlight::{
-    DiskLight, DistantLight, Environment, Filter, Illumination, Lamp, LightSampler, LightSamplerBuilder, Mesh,
-    PointLight, Profile, ProfileLight, Sides, SphereLight, SpotLight, Texture, TextureId, TubeLight, Weight, Wrap,
+    DiskLight, DistantLight, Environment, Filter, Illumination, Lamp, LightSample, LightSampler, LightSamplerBuilder,
+    Mesh, PointLight, Profile, ProfileLight, ShadingPoint, Sides, SphereLight, SpotLight, Texture, TextureId,
+    TubeLight, Visibility, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -177,4 +178,21 @@ impl Soup {
         };
         mesh.uvs(&self.uvs).weight(weight).sides(self.sides).groups(self.groups())
     }
+}
+
+/// Lights of two kinds, and the bytes of a table of visibility that was learned for them. Both are made once only.
+pub(crate) fn learned() -> (&'static LightSampler, Vec<u8>) {
+    static LEARNED: OnceLock<(LightSampler, Vec<u8>)> = OnceLock::new();
+    let (lights, bytes) = LEARNED.get_or_init(|| {
+        let lights = some_lights(13);
+        let point = |i: u64| {
+            let position = Vec3::from([i % 5, i % 7, i % 3].map(|k| k as f32));
+            if i.is_multiple_of(4) { ShadingPoint::volume(position) } else { ShadingPoint::surface(position, -Vec3::Z) }
+        };
+        let seen = |_: &ShadingPoint, sample: &LightSample| f32::from(u8::from(sample.position.x > 1.0));
+        let table = Visibility::learn(&lights.as_view(), 2000, point, seen).expect("nobody cancels");
+        let bytes = table.to_bytes();
+        (lights, bytes)
+    });
+    (lights, bytes.clone())
 }

@@ -5,7 +5,7 @@ pub(crate) mod reader;
 
 use fanlight::{
     Glossy, LightSample, LightSampler, LightSamplerView, RaySegment, Receiver, SampledLight, Scattering, ShadingPoint,
-    Splitting,
+    Splitting, VisibilityView,
 };
 use glam::Vec3;
 use reader::Reader;
@@ -52,6 +52,28 @@ pub(crate) fn bytes(data: &[u8]) {
     let aligned = &mut padded[start..start + bytes.len()];
     aligned.copy_from_slice(&bytes);
     let Ok(view) = LightSamplerView::from_bytes(aligned) else { return };
+    for _ in 0..4 {
+        sample(&view, &mut reader);
+    }
+}
+
+/// Loads bytes of a table of visibility, with some of them changed, and samples with it if it is accepted.
+pub(crate) fn visibility(data: &[u8]) {
+    let mut reader = Reader::new(data);
+    let (lights, mut bytes) = build::learned();
+    for _ in 0..reader.below(12) {
+        let at = reader.bits() as usize % bytes.len();
+        bytes[at] = reader.byte();
+    }
+    if reader.byte().is_multiple_of(8) {
+        bytes.truncate(reader.bits() as usize % bytes.len());
+    }
+    let mut padded = vec![0; bytes.len() + 4];
+    let start = padded.as_ptr().align_offset(4);
+    let aligned = &mut padded[start..start + bytes.len()];
+    aligned.copy_from_slice(&bytes);
+    let Ok(table) = VisibilityView::from_bytes(aligned) else { return };
+    let Ok(view) = lights.as_view().with_visibility(table) else { return };
     for _ in 0..4 {
         sample(&view, &mut reader);
     }

@@ -4,17 +4,21 @@
 //! that point alone; a sample on a portal stands for the sky along the direction, through whatever portals the ray crosses.
 
 use fanlight::{
-    Environment, Filter, Glossy, Hit, LightSampler, Mesh, MeshId, PointSampler, SampledLight, ShadingPoint, Texture,
-    TriangleId, Weight, Wrap,
+    Environment, Filter, Glossy, Hit, LightSample, LightSampler, Mesh, MeshId, PointSampler, SampledLight,
+    ShadingPoint, Texture, TriangleId, Visibility, Weight, Wrap,
 };
 use glam::Vec3;
 
 use super::{Lighting, LightsHere, Proposal, Target};
 use crate::Error;
 use crate::bsdf::{Material, Vertex};
+use crate::integrator::random_vertex;
 use crate::random::Pcg32;
 use crate::scene::Radiance;
 use crate::world::{EmitterPoint, World};
+
+/// A point at which nothing arrives.
+const NOWHERE: ShadingPoint = ShadingPoint::volume(Vec3::splat(f32::NAN));
 
 /// The lights of a scene.
 pub(super) struct Fanlight {
@@ -27,6 +31,8 @@ pub(super) struct Fanlight {
     open_sky: bool,
     /// Whether glossy surfaces are handed over as such.
     tells_lobes: bool,
+    /// What walls hide, if that has been learned.
+    visibility: Option<Visibility>,
 }
 
 impl Fanlight {
@@ -63,12 +69,51 @@ impl Fanlight {
             *next += emitter.mesh.indices.len() as u32;
             Some(first)
         });
-        Ok(Self { lights: builder.build()?, ids: ids.collect(), starts: starts.collect(), open_sky, tells_lobes: true })
+        Ok(Self {
+            lights: builder.build()?,
+            ids: ids.collect(),
+            starts: starts.collect(),
+            open_sky,
+            tells_lobes: true,
+            visibility: None,
+        })
     }
 
     /// Returns the same without lobes: all surfaces are taken for diffuse ones.
     pub(super) fn blind(self) -> Self {
         Self { tells_lobes: false, ..self }
+    }
+
+    /// Returns the same with what walls hide, learned at vertices of paths through the camera.
+    pub(super) fn learned(mut self, world: &World, bounces: u32, rays: u64) -> Result<Self, Error> {
+        let point = |i: u64| {
+            let vertex = random_vertex(world, bounces, &mut Pcg32::new(i, 2000));
+            vertex.map_or(NOWHERE, |vertex| self.shading_point(&vertex))
+        };
+        let transmittance = |x: &ShadingPoint, sample: &LightSample| {
+            let is_emitter =
+                sample.hit().is_some_and(|hit| (hit.triangle.mesh.index() as usize) < world.scene.emitters.len());
+            let is_seen = if is_emitter {
+                world.sees(x.position, sample.position)
+            } else {
+                world.sees_sky(x.position, sample.direction)
+            };
+            f32::from(u8::from(is_seen))
+        };
+        let visibility = Visibility::learn(&self.lights.as_view(), rays, point, transmittance)?;
+        self.visibility = Some(visibility);
+        Ok(self)
+    }
+
+    /// Returns what the crate is told of a vertex.
+    #[inline]
+    fn shading_point(&self, vertex: &Vertex) -> ShadingPoint {
+        match vertex.material {
+            Material::Glossy { alpha, .. } if self.tells_lobes => {
+                ShadingPoint::glossy(vertex.position, Glossy::new(vertex.normal, vertex.outgoing, alpha))
+            }
+            _ => ShadingPoint::surface(vertex.position, vertex.normal),
+        }
     }
 }
 
@@ -83,13 +128,12 @@ impl Lighting for Fanlight {
 
     #[inline]
     fn at(&self, vertex: &Vertex) -> Here<'_> {
-        let point = match vertex.material {
-            Material::Glossy { alpha, .. } if self.tells_lobes => {
-                ShadingPoint::glossy(vertex.position, Glossy::new(vertex.normal, vertex.outgoing, alpha))
-            }
-            _ => ShadingPoint::surface(vertex.position, vertex.normal),
-        };
-        Here { fanlight: self, lights: self.lights.at(&point) }
+        let point = self.shading_point(vertex);
+        let known = self.visibility.as_ref().and_then(|visibility| self.lights.with_visibility(visibility).ok());
+        match known {
+            Some(lights) => Here { fanlight: self, lights: lights.at(&point) },
+            None => Here { fanlight: self, lights: self.lights.at(&point) },
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use glam::Vec3;
 
 use crate::Error;
 use crate::bsdf::{Material, Vertex};
+use crate::clock::thread_seconds;
 use crate::film::Film;
 use crate::integrator::render_pass;
 use crate::random::Pcg32;
@@ -66,6 +67,8 @@ pub(crate) trait LightsHere {
 pub(crate) struct Method {
     pub(crate) name: &'static str,
     lighting: AnyLighting,
+    /// CPU time that was spent before the first image, and is part of each.
+    pub(crate) preparation: f64,
 }
 
 enum AnyLighting {
@@ -85,21 +88,28 @@ macro_rules! with {
 
 impl Method {
     /// Returns the methods that a scene is rendered with: what hosts have, and at last fanlight; where there are glossy
-    /// surfaces, once without their lobes.
-    pub(crate) fn all(world: &World) -> Result<Vec<Self>, Error> {
+    /// surfaces, once without their lobes; and once with what walls hide, if there are rays to learn it by.
+    pub(crate) fn all(world: &World, bounces: u32, learned_rays: u64) -> Result<Vec<Self>, Error> {
         let mut methods = Self::competitors(world);
-        let ours = |name, fanlight| Self { name, lighting: AnyLighting::Fanlight(Box::new(fanlight)) };
+        let ours =
+            |name, fanlight| Self { name, lighting: AnyLighting::Fanlight(Box::new(fanlight)), preparation: 0.0 };
         methods.push(ours("fanlight", Fanlight::new(world)?));
         let is_glossy = |(_, material): &(_, Material)| matches!(material, Material::Glossy { .. });
         if world.scene.solids.iter().any(is_glossy) {
             methods.push(ours("fanlight@blind", Fanlight::new(world)?.blind()));
+        }
+        if learned_rays > 0 {
+            let fanlight = Fanlight::new(world)?;
+            let before = thread_seconds();
+            let method = ours("fanlight@visibility", fanlight.learned(world, bounces, learned_rays)?);
+            methods.push(Self { preparation: thread_seconds() - before, ..method });
         }
         Ok(methods)
     }
 
     /// Returns what hosts have.
     fn competitors(world: &World) -> Vec<Self> {
-        let plain = |name, plain| Self { name, lighting: AnyLighting::Plain(Box::new(plain)) };
+        let plain = |name, plain| Self { name, lighting: AnyLighting::Plain(Box::new(plain)), preparation: 0.0 };
         let mut methods = vec![plain("bsdf", Plain::default())];
         let has_emitters = !world.emitters.is_empty();
         if has_emitters {
@@ -122,7 +132,7 @@ impl Method {
         if !world.emitters.is_empty() {
             plain = plain.with_emitters(world, Choice::Power);
         }
-        Self { name: "reference", lighting: AnyLighting::Plain(Box::new(plain)) }
+        Self { name: "reference", lighting: AnyLighting::Plain(Box::new(plain)), preparation: 0.0 }
     }
 
     /// Whether this is what others are compared with.

@@ -1,0 +1,224 @@
+//! Regions of space and orientation, divided where reports are.
+//!
+//! Each orientation has a tree of planes perpendicular to the axes. A region is divided in the middle of the longest side of
+//! the box around its reports, so that empty space costs a few planes at most, however large the scene.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use glam::Vec3;
+
+use super::table::{NOTHING, ORIENTATIONS, REGION, RegionNode, find};
+use crate::math;
+use crate::receiver::{Receiver, ReceiverKind};
+
+/// Returns the root that a receiver belongs to: that of the axis which is nearest to its normal, or the last one for a
+/// receiver without a side.
+#[inline]
+pub(crate) fn orientation(receiver: &Receiver) -> usize {
+    if !receiver.has_horizon() {
+        return ORIENTATIONS - 1;
+    }
+    let normal = receiver.normal().to_array();
+    let size = normal.map(f32::abs);
+    let mut axis = usize::from(size[1] > size[0]);
+    if size[2] > size[axis] {
+        axis = 2;
+    }
+    2 * axis + usize::from(normal[axis] < 0.0)
+}
+
+/// Where the reports of a region are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Extent {
+    pub(crate) count: u64,
+    pub(crate) low: Vec3,
+    pub(crate) high: Vec3,
+}
+
+impl Extent {
+    pub(crate) const EMPTY: Self = Self { count: 0, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+
+    /// Adds a position.
+    pub(crate) fn add(&mut self, position: Vec3) {
+        self.merge(&Self { count: 1, low: position, high: position });
+    }
+
+    /// Adds all of another. Neither sums of integers nor extremes depend on the order.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.count = self.count.saturating_add(other.count);
+        self.low = self.low.min(other.low);
+        self.high = self.high.max(other.high);
+    }
+
+    /// Returns the axis and the coordinate of the plane through the middle, if that has two sides.
+    fn middle(&self) -> Option<(usize, f32)> {
+        let size = self.high - self.low;
+        let axis = (0..3).fold(0, |best, axis| if size[axis] > size[best] { axis } else { best });
+        let plane = 0.5 * self.low[axis] + 0.5 * self.high[axis];
+        (plane > self.low[axis] && plane <= self.high[axis]).then_some((axis, plane))
+    }
+}
+
+/// The regions as they grow.
+#[derive(Clone, Debug)]
+pub(crate) struct RegionBuilder {
+    nodes: Vec<RegionNode>,
+    /// Node of each region.
+    leaves: Vec<u32>,
+    /// Where the reports of each region are, since it was divided.
+    pub(crate) extents: Vec<Extent>,
+    /// Where all reports of an orientation are.
+    around: [Extent; ORIENTATIONS],
+}
+
+impl RegionBuilder {
+    /// Returns one region for each orientation.
+    pub(crate) fn new() -> Self {
+        let count = ORIENTATIONS as u32;
+        Self {
+            nodes: (0..count).map(|first| RegionNode { kind: REGION, plane: 0.0, first }).collect(),
+            leaves: (0..count).collect(),
+            extents: vec![Extent::EMPTY; ORIENTATIONS],
+            around: [Extent::EMPTY; ORIENTATIONS],
+        }
+    }
+
+    /// Returns the same regions as if nothing had been reported.
+    pub(crate) fn without_reports(mut self) -> Self {
+        self.extents.fill(Extent::EMPTY);
+        self
+    }
+
+    /// Number of regions.
+    pub(crate) fn len(&self) -> usize {
+        self.leaves.len()
+    }
+
+    /// Returns the region of a position of an orientation.
+    pub(crate) fn find(&self, orientation: usize, position: Vec3) -> Option<u32> {
+        position.is_finite().then(|| find(&self.nodes, orientation, position))?
+    }
+
+    /// Adds where the reports of all regions have been.
+    pub(crate) fn add(&mut self, extents: &[Extent]) {
+        self.extents.iter_mut().zip(extents).for_each(|(extent, other)| extent.merge(other));
+    }
+
+    /// Takes note of where the reports of each orientation are, before regions are divided.
+    pub(crate) fn surround(&mut self) {
+        for root in 0..ORIENTATIONS {
+            let mut around = self.around[root];
+            self.visit(root, &mut |region, builder| around.merge(&builder.extents[region as usize]));
+            self.around[root] = around;
+        }
+    }
+
+    fn visit(&self, node: usize, visit: &mut impl FnMut(u32, &Self)) {
+        let RegionNode { kind, first, .. } = self.nodes[node];
+        if kind == REGION {
+            visit(first, self);
+        } else {
+            self.visit(first as usize, visit);
+            self.visit(first as usize + 1, visit);
+        }
+    }
+
+    /// Divides a region in two. Returns the number of the new one: the old number stays with what is below the plane.
+    pub(crate) fn divide(&mut self, region: u32) -> Option<u32> {
+        let (axis, plane) = self.extents[region as usize].middle()?;
+        let (first, new) = (self.nodes.len() as u32, self.leaves.len() as u32);
+        self.nodes[self.leaves[region as usize] as usize] = RegionNode { kind: axis as u32, plane, first };
+        for number in [region, new] {
+            self.nodes.push(RegionNode { kind: REGION, plane: 0.0, first: number });
+        }
+        self.leaves[region as usize] = first;
+        self.leaves.push(first + 1);
+        self.extents[region as usize] = Extent::EMPTY;
+        self.extents.push(Extent::EMPTY);
+        Some(new)
+    }
+
+    /// Divides regions until none holds more than `most` of these positions, or there are `limit` regions.
+    pub(crate) fn cover(&mut self, points: &mut [(usize, Vec3)], most: usize, limit: usize) {
+        let (mut from, mut waiting) = (0, Vec::new());
+        points.sort_by_key(|(orientation, _)| *orientation);
+        for root in 0..ORIENTATIONS {
+            let count = points[from..].iter().take_while(|(orientation, _)| *orientation == root).count();
+            points[from..from + count].iter().for_each(|(_, position)| self.around[root].add(*position));
+            waiting.push((root as u32, from, from + count));
+            from += count;
+        }
+        // Breadth first, so that the limit is shared.
+        let mut next = 0;
+        while let Some(&(region, start, end)) = waiting.get(next) {
+            next += 1;
+            let points = &mut points[start..end];
+            let mut extent = Extent::EMPTY;
+            points.iter().for_each(|(_, position)| extent.add(*position));
+            if points.len() <= most || self.len() >= limit {
+                continue;
+            }
+            let Some((axis, plane)) = extent.middle() else { continue };
+            self.extents[region as usize] = extent;
+            let Some(new) = self.divide(region) else { continue };
+            points.sort_by_key(|(_, position)| position[axis] >= plane);
+            let below = points.iter().take_while(|(_, p)| !(p[axis] >= plane)).count();
+            waiting.push((region, start, start + below));
+            waiting.push((new, start + below, end));
+        }
+        self.extents.fill(Extent::EMPTY);
+    }
+
+    /// Returns the nodes as a table holds them, with regions numbered anew: `number` returns the new number, or `None` for a
+    /// region of which nothing is known. What is far from all reports is in no region.
+    pub(crate) fn freeze(&self, number: impl Fn(u32) -> Option<u32>) -> Vec<RegionNode> {
+        let nothing = RegionNode { kind: NOTHING, plane: 0.0, first: 0 };
+        let mut nodes = vec![nothing; ORIENTATIONS];
+        for (root, around) in self.around.iter().enumerate() {
+            let mut at = root;
+            if around.count > 0 {
+                // Above rounding, so that reports of a single position have a region as well.
+                let size = around.low.abs().max(around.high.abs()).max_element();
+                let least = f32::EPSILON * size + f32::MIN_POSITIVE;
+                let margin = math::at_least(MARGIN * (around.high - around.low).max_element(), least);
+                let ends = [around.low - margin, around.high + margin];
+                for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
+                    let first = nodes.len();
+                    let plane = ends[side][axis];
+                    nodes[at] = RegionNode { kind: axis as u32, plane, first: first as u32 };
+                    nodes.extend([nothing; 2]);
+                    at = first + 1 - side;
+                }
+                self.copy(root, at, &mut nodes, &number);
+            }
+        }
+        nodes
+    }
+
+    fn copy(&self, from: usize, to: usize, nodes: &mut Vec<RegionNode>, number: &impl Fn(u32) -> Option<u32>) {
+        let RegionNode { kind, plane, first } = self.nodes[from];
+        if kind == REGION {
+            let region = number(first);
+            nodes[to] = region.map_or(nodes[to], |first| RegionNode { kind: REGION, plane: 0.0, first });
+            return;
+        }
+        let place = nodes.len();
+        nodes[to] = RegionNode { kind, plane, first: place as u32 };
+        nodes.extend([RegionNode { kind: NOTHING, plane: 0.0, first: 0 }; 2]);
+        for side in 0..2 {
+            self.copy(first as usize + side, place + side, nodes, number);
+        }
+    }
+
+    /// Returns the two halves of a node, or the region that it is.
+    pub(super) fn halves(&self, node: usize) -> Result<[usize; 2], u32> {
+        let RegionNode { kind, first, .. } = self.nodes[node];
+        if kind == REGION { Err(first) } else { Ok([first as usize, first as usize + 1]) }
+    }
+}
+
+/// How far regions reach beyond all reports, relative to the extent of these. *Chosen.*
+///
+/// Larger: what was learned at the edge holds farther away. Smaller: points next to those that were reported have no region.
+const MARGIN: f32 = 0.01;
