@@ -1,5 +1,6 @@
 //! The one error type of the crate.
 
+use alloc::boxed::Box;
 use core::fmt;
 
 use crate::progress::Cancelled;
@@ -85,6 +86,18 @@ pub(crate) enum ErrorKind {
     UnknownLight { light: usize, lights: usize },
     /// A light without triangles that is not in the tree, for it emitted nothing, but would have to be.
     RevivedLight { light: usize },
+    /// What is wrong with a mesh of an object.
+    InObject { object: usize, kind: Box<ErrorKind> },
+    /// An object without triangles.
+    EmptyObject { object: usize },
+    /// A handle to an object that this builder did not give out.
+    UnknownObject { instance: usize, object: usize, objects: usize },
+    /// An instance of which a number is NaN, infinite or out of its range.
+    Instance { instance: usize, what: &'static str, value: f32, expected: &'static str },
+    /// A changed instance of another object than before.
+    OtherObject { instance: usize, object: u32, expected: u32 },
+    /// An instance that a sampler does not hold.
+    UnknownInstance { instance: usize, instances: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -99,7 +112,13 @@ pub(crate) enum ErrorKind {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.0 {
+        self.0.fmt(f)
+    }
+}
+
+impl fmt::Display for ErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             ErrorKind::ImageSize { what, width, height, limit } => {
                 write!(f, "{what}: {width} x {height} texels, but each side must be from 1 to {limit}")
             }
@@ -165,6 +184,23 @@ impl fmt::Display for Error {
             }
             ErrorKind::RevivedLight { light } => {
                 write!(f, "light {light} emits now, but emitted nothing when the sampler was built")
+            }
+            ErrorKind::InObject { object, kind } => write!(f, "object {object}: {kind}"),
+            ErrorKind::EmptyObject { object } => write!(f, "object {object} has no triangles"),
+            ErrorKind::UnknownObject { instance, object, objects } => {
+                write!(f, "instance {instance}: object {object} was never added, this builder has {objects}")
+            }
+            ErrorKind::Instance { instance, what, value, expected } => {
+                write!(f, "instance {instance}: the {what} is {value}, but must be {expected}")
+            }
+            ErrorKind::OtherObject { instance, object, expected } => {
+                write!(
+                    f,
+                    "instance {instance}: it is one of object {object} now, but was added as one of object {expected}"
+                )
+            }
+            ErrorKind::UnknownInstance { instance, instances } => {
+                write!(f, "instance {instance} was never added, this sampler has {instances}")
             }
             ErrorKind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             ErrorKind::Cancelled => write!(f, "the build was cancelled"),

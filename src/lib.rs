@@ -162,10 +162,13 @@ pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
 pub use light::{
-    DiskLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Sides, SphereLight, SpotLight, TubeLight, Weight,
+    DiskLight, Illumination, Instance, Lamp, Mesh, MeshUpdate, PointLight, Sides, SphereLight, SpotLight, TubeLight,
+    Weight,
 };
 pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
-pub use record::{Filter, Hit, LightId, LightSample, MeshId, SampledLight, TextureId, TriangleId, Wrap};
+pub use record::{
+    Filter, Hit, InstanceId, LightId, LightSample, MeshId, ObjectId, SampledLight, TextureId, TriangleId, Wrap,
+};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
     ResampledLight,

@@ -4,6 +4,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::instance::{AddedObject, InstanceRecord, PlacedObject};
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
 use super::{Energies, Illumination, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
 use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
@@ -23,11 +24,11 @@ enum WeightTexture<'a> {
 pub(crate) struct LightCollection<'a> {
     textures: Vec<WeightTexture<'a>>,
     /// Triangles that may emit light.
-    triangles: Vec<LightTriangle>,
+    pub(super) triangles: Vec<LightTriangle>,
     /// For every triangle that was added, its index in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
-    indices: Vec<u32>,
+    pub(super) indices: Vec<u32>,
     /// Where each mesh starts in `indices`, and the end.
-    meshes: Vec<u32>,
+    pub(super) meshes: Vec<u32>,
     /// Lights that are not made of triangles.
     lamps: Vec<LampRecord>,
     cells: Vec<CellNode>,
@@ -37,7 +38,13 @@ pub(crate) struct LightCollection<'a> {
     images: Vec<ImageTree<'a>>,
     shared_images: BTreeMap<TreeKey, u32>,
     /// Triangles, by their places in `indices`, with the numbers of their trees over images.
-    pending: Vec<(u32, u32)>,
+    pub(super) pending: Vec<(u32, u32)>,
+    /// Objects that are still to be built.
+    pub(super) objects: Vec<AddedObject>,
+    /// Objects that are built, as words.
+    pub(super) object_words: Vec<u32>,
+    pub(super) instances: Vec<InstanceRecord>,
+    pub(super) objects_have_portals: bool,
 }
 
 /// A texture and the bits of the three uvs: what a tree depends on.
@@ -63,6 +70,10 @@ impl<'a> LightCollection<'a> {
             images: Vec::new(),
             shared_images: BTreeMap::new(),
             pending: Vec::new(),
+            objects: Vec::new(),
+            object_words: Vec::new(),
+            instances: Vec::new(),
+            objects_have_portals: false,
         }
     }
 
@@ -123,7 +134,7 @@ impl<'a> LightCollection<'a> {
 
     /// Number of lights that may emit, by what is known of them.
     pub(crate) fn light_count(&self) -> usize {
-        self.triangles.len() + self.lamps.len()
+        self.triangles.len() + self.lamps.len() + self.instances.len()
     }
 
     /// Builds the trees over images. Only then the lights are complete.
@@ -142,6 +153,19 @@ impl<'a> LightCollection<'a> {
         for (tree, root) in order.into_iter().zip(built) {
             roots[tree as usize] = root;
         }
+        self.set_roots(&roots);
+        let mut objects = core::mem::take(&mut self.objects);
+        for object in &mut objects {
+            self.exchange_meshes(object);
+            self.set_roots(&roots);
+            self.exchange_meshes(object);
+        }
+        self.objects = objects;
+        Ok(())
+    }
+
+    /// Gives the triangles that wait for trees over images their roots.
+    fn set_roots(&mut self, roots: &[Root]) {
         for (at, tree) in core::mem::take(&mut self.pending) {
             let (index, root) = (&mut self.indices[at as usize], roots[tree as usize]);
             if let Some(triangle) = self.triangles.get_mut(*index as usize) {
@@ -151,7 +175,6 @@ impl<'a> LightCollection<'a> {
             }
         }
         self.remove_black();
-        Ok(())
     }
 
     /// Removes the triangles on which an image turned out to be black.
@@ -175,12 +198,18 @@ impl<'a> LightCollection<'a> {
         }
     }
 
-    /// Returns a light by its index among those that may emit: first the triangles, then the lamps.
+    /// Returns a light by its index among those that may emit: first the triangles, then the lamps, then the instances.
     pub(crate) fn light(&self, index: u32) -> Light<'_> {
         let index = index as usize;
         match self.triangles.get(index) {
             Some(triangle) => Light::Triangle(triangle),
-            None => Light::Lamp(&self.lamps[index - self.triangles.len()]),
+            None => match self.lamps.get(index - self.triangles.len()) {
+                Some(lamp) => Light::Lamp(lamp),
+                None => {
+                    let instance = &self.instances[index - self.triangles.len() - self.lamps.len()];
+                    Light::Instance(PlacedObject::new(instance, &self.object_words))
+                }
+            },
         }
     }
 
@@ -195,7 +224,7 @@ impl<'a> LightCollection<'a> {
     ///
     /// If there are more of them than leaves in a tree.
     pub(crate) fn emitting(&self, energies: &Energies<'_>) -> Result<Vec<u32>, Error> {
-        let emits = parallel::collect(self.light_count(), |i| energies.energy(self.light(i as u32)) > 0.0);
+        let emits = parallel::collect(self.light_count(), |i| energies.may_emit(self.light(i as u32)));
         let emitting: Vec<u32> = (0..).zip(emits).filter_map(|(i, emits)| emits.then_some(i)).collect();
         if emitting.len() > MAX_LEAVES {
             let count = emitting.len();
@@ -205,32 +234,41 @@ impl<'a> LightCollection<'a> {
     }
 
     /// Returns the lights with these indices, in the order of leaves that is given.
-    pub(crate) fn into_lights(self, illumination: Illumination, leaves: &[u32]) -> Lights {
-        let has_portals = self.triangles.iter().any(LightKind::is_portal);
+    pub(crate) fn into_lights(mut self, illumination: Illumination, leaves: &[u32]) -> Lights {
+        let has_portals = self.triangles.iter().any(LightKind::is_portal) || self.objects_have_portals;
         let first_lamp = self.triangles.len() as u32;
+        let first_instance = first_lamp + self.lamps.len() as u32;
         let mut leaf_of_index = vec![NO_LEAF; self.light_count()];
         for (leaf, &index) in (0..).zip(leaves) {
             leaf_of_index[index as usize] = leaf;
         }
         let leaf_of = |&index: &u32| leaf_of_index.get(index as usize).copied().unwrap_or(index);
-        let lamp_leaves = &leaf_of_index[first_lamp as usize..];
+        let lamp_leaves = &leaf_of_index[first_lamp as usize..first_instance as usize];
         let leaf_of = self.indices.iter().map(leaf_of).chain(lamp_leaves.iter().copied()).collect();
         let record = |leaf: usize| match leaves[leaf].checked_sub(first_lamp) {
             None => self.triangles[leaves[leaf] as usize],
-            Some(lamp) => self.lamps[lamp as usize].into_triangle(),
+            Some(number) => match self.lamps.get(number as usize) {
+                Some(lamp) => lamp.into_triangle(),
+                None => LightTriangle::of_instance(leaves[leaf] - first_instance),
+            },
         };
         let records = parallel::collect(leaves.len(), record);
+        for (instance, leaf) in self.instances.iter_mut().zip(&leaf_of_index[first_instance as usize..]) {
+            instance.leaf = *leaf;
+        }
         Lights {
             illumination,
             energy: 0.0,
             has_portals,
-            has_lamps: leaves.iter().any(|&index| index >= first_lamp),
+            has_lamps: leaves.iter().any(|index| (first_lamp..first_instance).contains(index)),
             is_crossed_once: false,
             records,
             cells: self.cells,
             leaf_of,
             meshes: self.meshes,
             scales: Vec::new(),
+            objects: self.object_words,
+            instances: self.instances,
         }
     }
 

@@ -10,7 +10,9 @@ mod crossing;
 mod emitted;
 mod energy;
 mod illumination;
+mod instance;
 mod lamp;
+mod leaf;
 mod linear_density;
 mod mesh;
 mod meshes;
@@ -36,9 +38,13 @@ pub(crate) use collect::LightCollection;
 pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub use illumination::Illumination;
+pub use instance::Instance;
+use instance::InstanceRecord;
+pub(crate) use instance::{ObjectWalk, PlacedObject, PlacedTriangle};
 use lamp::LampRecord;
 pub(crate) use lamp::LampView;
 pub use lamp::{DiskLight, Lamp, PointLight, SphereLight, SpotLight, TubeLight};
+pub(crate) use leaf::LightLeaf;
 pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
@@ -78,6 +84,10 @@ buffers! {
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
+        /// Objects, as words one after the other.
+        objects: u32 = b"OBJE" version 1,
+        /// Instances of objects, by their ids.
+        instances: InstanceRecord = b"INST" version 1,
     }
 }
 
@@ -88,6 +98,8 @@ pub(crate) enum Light<'a> {
     Triangle(&'a LightTriangle),
     /// Anything else.
     Lamp(&'a LampRecord),
+    /// An object in its place.
+    Instance(PlacedObject<'a>),
 }
 
 /// A light of any kind as seen from a shading point.
@@ -136,7 +148,7 @@ impl LocalPoint {
 /// A point on a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightPoint {
-    pub(crate) leaf: u32,
+    pub(crate) leaf: LightLeaf,
     pub(crate) point: LocalPoint,
 }
 
@@ -208,6 +220,13 @@ pub(crate) trait LightViewKind {
 
 /// Calls the same method of whichever kind a light is.
 macro_rules! dispatch {
+    (Light, $light:expr, $kind:ident => $call:expr) => {
+        match $light {
+            Light::Triangle($kind) => $call,
+            Light::Lamp($kind) => $call,
+            Light::Instance($kind) => $call,
+        }
+    };
     ($enum:ident, $light:expr, $kind:ident => $call:expr) => {
         match $light {
             $enum::Triangle($kind) => $call,
@@ -306,9 +325,11 @@ impl LightView<'_> {
 impl<'a> Light<'a> {
     /// Returns the light of a record.
     #[inline(always)]
-    fn of(record: &'a LightTriangle) -> Self {
+    fn of(record: &'a LightTriangle, instances: &'a [InstanceRecord], objects: &'a [u32]) -> Self {
         if record.index_and_flags & LightTriangle::LAMP == 0 {
             Light::Triangle(record)
+        } else if let Some(instance) = record.instance() {
+            Light::Instance(PlacedObject::new(&instances[instance as usize], objects))
         } else {
             Light::Lamp(bytemuck::cast_ref(record))
         }
@@ -319,21 +340,25 @@ impl<'a> Light<'a> {
     fn triangle(self) -> Option<&'a LightTriangle> {
         match self {
             Self::Triangle(triangle) => Some(triangle),
-            Self::Lamp(_) => None,
+            Self::Lamp(_) | Self::Instance(_) => None,
         }
     }
 
     /// Returns what the weight of the light is multiplied by, by the factors of the meshes.
     #[inline]
     fn scale(self, factors: &[f32], meshes: &[u32]) -> f32 {
-        self.triangle().map_or(1.0, |triangle| scale_of(factors, meshes, triangle.index()))
+        match self {
+            Self::Triangle(triangle) => scale_of(factors, meshes, triangle.index()),
+            Self::Lamp(_) => 1.0,
+            Self::Instance(placed) => placed.weight(),
+        }
     }
 }
 
 impl LightPoint {
     /// Returns the point of a triangle with barycentrics that may have been rounded.
     #[inline]
-    pub(crate) fn new(leaf: u32, barycentrics: [f32; 2]) -> Self {
+    pub(crate) fn new(leaf: LightLeaf, barycentrics: [f32; 2]) -> Self {
         Self { leaf, point: LocalPoint::on_triangle(Lattice::from_barycentrics(barycentrics)) }
     }
 }
@@ -352,7 +377,7 @@ impl<'a> LightsView<'a> {
     /// Returns the light in a leaf.
     #[inline(always)]
     pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
-        Light::of(&self.records[leaf as usize])
+        Light::of(&self.records[leaf as usize], self.instances, self.objects)
     }
 
     /// Fetches the memory of the light in a leaf, so that a later look at it does not wait.
@@ -366,19 +391,36 @@ impl<'a> LightsView<'a> {
     #[inline(always)]
     pub(crate) fn view<'v>(
         &self,
-        leaf: u32,
+        leaf: LightLeaf,
         x: &ShadingPoint,
         environment: Option<&'v EnvironmentView<'v>>,
     ) -> Option<LightView<'v>>
     where
         'a: 'v,
     {
-        match self.light(leaf) {
+        match self.light(leaf.top) {
             Light::Triangle(light) => {
                 TriangleView::wrapped(light, x, self.illumination, self.cells, environment, LightView::Triangle)
             }
             Light::Lamp(lamp) => LampView::new(lamp, x).map(LightView::Lamp),
+            Light::Instance(placed) => self.view_within(&placed, leaf, x, environment),
         }
+    }
+
+    /// Returns a triangle of an instance as seen from a shading point.
+    #[inline(never)]
+    fn view_within<'v>(
+        &self,
+        placed: &PlacedObject<'a>,
+        leaf: LightLeaf,
+        x: &ShadingPoint,
+        environment: Option<&'v EnvironmentView<'v>>,
+    ) -> Option<LightView<'v>>
+    where
+        'a: 'v,
+    {
+        let triangle = placed.triangle(leaf.below()?);
+        TriangleView::placed(&triangle, x, self.illumination, self.cells, environment, LightView::Triangle)
     }
 
     /// Returns the leaf of a triangle; `None` for one that emits nothing or that was never added.
@@ -396,24 +438,32 @@ impl<'a> LightsView<'a> {
         self.leaf_of.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
     }
 
+    /// Returns the leaf of the triangle of a hit; `None` for one that emits nothing or that was never added.
+    pub(crate) fn leaf_of_hit(&self, hit: &Hit) -> Option<LightLeaf> {
+        match hit.instance {
+            None => self.leaf(hit.triangle).map(LightLeaf::alone),
+            Some(instance) => self.leaf_within(instance, hit.triangle),
+        }
+    }
+
     /// Returns the leaf of what was sampled; `None` for the environment.
-    pub(crate) fn leaf_of_sampled(&self, light: &SampledLight) -> Option<u32> {
+    pub(crate) fn leaf_of_sampled(&self, light: &SampledLight) -> Option<LightLeaf> {
         match light {
-            SampledLight::Triangle(hit) => self.leaf(hit.triangle),
-            SampledLight::Shape(id) | SampledLight::Punctual(id) => self.leaf_of_lamp(*id),
+            SampledLight::Triangle(hit) => self.leaf_of_hit(hit),
+            SampledLight::Shape(id) | SampledLight::Punctual(id) => self.leaf_of_lamp(*id).map(LightLeaf::alone),
             SampledLight::Environment => None,
         }
     }
 
     /// Returns what a host gets to know of a point of a light.
+    #[inline]
     pub(crate) fn sampled(&self, LightPoint { leaf, point }: LightPoint) -> SampledLight {
-        match self.light(leaf) {
-            Light::Triangle(triangle) => SampledLight::Triangle(Hit {
-                triangle: self.id(triangle),
-                barycentrics: point.lattice().to_barycentrics(),
-            }),
-            Light::Lamp(lamp) => lamp.sampled(),
-        }
+        let (triangle, instance) = match self.light(leaf.top) {
+            Light::Triangle(triangle) => (self.id(triangle), None),
+            Light::Lamp(lamp) => return lamp.sampled(),
+            Light::Instance(placed) => self.id_within(leaf, &placed),
+        };
+        SampledLight::Triangle(Hit { triangle, barycentrics: point.lattice().to_barycentrics(), instance })
     }
 
     /// Returns the point of a lamp in a direction; `None` for a lamp without an extent, or one that emits nothing or was never
@@ -421,7 +471,8 @@ impl<'a> LightsView<'a> {
     pub(crate) fn point_of_lamp(&self, id: LightId, direction: Vec3) -> Option<LightPoint> {
         let leaf = self.leaf_of_lamp(id)?;
         let Light::Lamp(lamp) = self.light(leaf) else { return None };
-        lamp.has_extent().then(|| LightPoint { leaf, point: LocalPoint::from_direction(direction) })
+        lamp.has_extent()
+            .then(|| LightPoint { leaf: LightLeaf::alone(leaf), point: LocalPoint::from_direction(direction) })
     }
 
     fn id(&self, triangle: &LightTriangle) -> TriangleId {
@@ -432,7 +483,7 @@ impl<'a> LightsView<'a> {
 
     /// Returns what the weight of a light is multiplied by.
     #[inline]
-    pub(crate) fn scale(&self, leaf: u32) -> f32 {
-        self.light(leaf).scale(self.scales, self.meshes)
+    pub(crate) fn scale(&self, leaf: LightLeaf) -> f32 {
+        self.light(leaf.top).scale(self.scales, self.meshes)
     }
 }

@@ -111,7 +111,8 @@ impl LightSampler {
         self.environment.set_rotation(rotation)
     }
 
-    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them.
+    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them. A triangle of an
+    /// object counts once for each of the object's instances.
     #[must_use]
     pub fn light_count(&self) -> usize {
         self.as_view().light_count()
@@ -143,10 +144,11 @@ impl<'a> LightSamplerView<'a> {
         self.scene.environment
     }
 
-    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them.
+    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them. A triangle of an
+    /// object counts once for each of the object's instances.
     #[must_use]
     pub fn light_count(&self) -> usize {
-        self.scene.lights.len()
+        self.scene.lights.count()
     }
 
     /// Returns the number of bytes that the structures take.

@@ -7,6 +7,7 @@
 //! it is a light.
 
 mod features;
+mod instances;
 mod mixture;
 mod sky;
 mod trees;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::env::{EnvironmentView, RegionMoments};
-use crate::light::{LightKind, LightPoint, LightView, LightsView};
+use crate::light::{LightKind, LightLeaf, LightPoint, LightView, LightsView};
 use crate::math::{at_least, only_if};
 use crate::receiver::ShadingPoint;
 use crate::tlas::{LeafOracle, TlasView};
@@ -45,15 +45,22 @@ impl<'a> LightScene<'a> {
         &self,
         origin: Vec3,
         direction: Vec3,
-        mut is_wanted: impl FnMut(u32) -> bool,
+        mut is_wanted: impl FnMut(LightLeaf) -> bool,
         mut visit: impl FnMut(LightPoint),
     ) {
-        self.tlas.cross(origin, direction, |leaf| {
-            let point = if is_wanted(leaf) { self.lights.light(leaf).intersect(origin, direction) } else { None };
+        let mut visit_leaf = |leaf: LightLeaf| {
+            let point = if is_wanted(leaf) { self.lights.intersect(leaf, origin, direction) } else { None };
             if let Some(point) = point {
                 visit(LightPoint { leaf, point });
             }
-        });
+        };
+        if self.lights.has_instances() {
+            self.tlas.cross(origin, direction, |leaf| {
+                self.visit_within(leaf, &mut visit_leaf, |placed, visit| placed.cross(origin, direction, visit));
+            });
+        } else {
+            self.tlas.cross(origin, direction, |leaf| visit_leaf(LightLeaf::alone(leaf)));
+        }
     }
 }
 
@@ -67,7 +74,7 @@ pub(crate) struct Viewpoint<'a> {
 impl Viewpoint<'_> {
     /// Returns a light as seen from here; `None` if nothing can arrive from it.
     #[inline]
-    pub(crate) fn view(&self, leaf: u32) -> Option<LightView<'_>> {
+    pub(crate) fn view(&self, leaf: LightLeaf) -> Option<LightView<'_>> {
         self.scene.lights.view(leaf, &self.x, self.scene.directional_environment())
     }
 }

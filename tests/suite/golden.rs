@@ -9,6 +9,8 @@ use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Scene, random_point};
+use crate::instances;
+use crate::instances::town::Town;
 use crate::kinds::{mixed, pdf_again};
 use fanlight::{LightSample, LightSampler, MeshId, ShadingPoint, Splitting, TriangleId};
 
@@ -16,6 +18,8 @@ const SCENES: usize = 70;
 const POINTS: usize = 60;
 /// Scenes that mix all kinds of lights.
 const KINDS: usize = 12;
+/// Scenes of instances.
+const TOWNS: usize = 12;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// The same scenes at points with lobes.
@@ -120,6 +124,33 @@ fn line_of_kinds(number: usize) -> String {
     format!("{number:2} kinds {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene of instances.
+fn line_of_town(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let town = Town::random(&mut pcg, number % 5, number % 2 == 0, number % 5);
+    let lights = town.build(ARITIES[number % 3]);
+    let splitting = Splitting::new(0.7, 2);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    let emission = lights.emission();
+    for i in 0..POINTS {
+        let x = instances::point(&town, &mut pcg, i);
+        let at = lights.at(&x);
+        let u = pcg.cube();
+        for sample in at.sample(u).iter().chain(sample_split(&at, u, &splitting).iter().take(8)) {
+            drawn += 1;
+            let hit = sample.hit().expect("a triangle");
+            hash.add(&[f32::from_bits(hit.instance.map_or(u32::MAX, |instance| instance.index()))]);
+            hash.add_sample(sample);
+            hash.add(&[at.pdf(&hit), at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
+        }
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            [ray.position, ray.normal, ray.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[ray.pdf, ray.pmf, emission.pdf_ray(x.position, pcg.direction())]);
+        }
+    }
+    format!("{number:2} instances {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -132,9 +163,13 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let kinds = if has_lobes { 0 } else { KINDS };
-    let line = |i| if i < SCENES { line(i, has_lobes) } else { line_of_kinds(i - SCENES) };
-    let found = parallel::map(SCENES + kinds, line).concat();
+    let (kinds, towns) = if has_lobes { (0, 0) } else { (KINDS, TOWNS) };
+    let line = |i| match i {
+        _ if i < SCENES => line(i, has_lobes),
+        _ if i < SCENES + KINDS => line_of_kinds(i - SCENES),
+        _ => line_of_town(i - SCENES - KINDS),
+    };
+    let found = parallel::map(SCENES + kinds + towns, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {
         std::fs::write(&path, found).expect("the list can be written");
         panic!("{} is written, and nothing was compared", path.display());

@@ -20,6 +20,7 @@ mod errors;
 mod fuzz_regressions;
 #[cfg(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))]
 mod golden;
+mod instances;
 mod invariance;
 mod irradiance;
 mod kinds;

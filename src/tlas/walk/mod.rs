@@ -9,6 +9,7 @@ mod importance;
 pub(in crate::tlas) mod ray;
 mod shaped;
 mod split;
+mod within;
 
 use glam::Vec3;
 
