@@ -49,7 +49,7 @@ pub(crate) struct TriangleView<'a> {
     pub(super) vertices: [Vec3; 3],
     /// Vertices relative to the shading point, in double precision.
     pub(super) exact_vertices: [DVec3; 3],
-    /// Determinant of the vertices, by exact differences: negative in front.
+    /// Determinant of the vertices, by exact differences: negative in front, but for mirror images.
     pub(super) determinant: f64,
     /// Unit normal of the front side.
     normal: Vec3,
@@ -104,6 +104,9 @@ impl<'a> TriangleView<'a> {
         let exact = triangle.exactly_relative_to(x.position);
         let relative = (exact, exact.map(|vertex| vertex.as_vec3()));
         let front = triangle.double_area_vector();
+        // The order of the vertices is the object's own, whichever way it runs around the front.
+        let turn = if triangle.is_mirrored() { -1.0 } else { 1.0 };
+        let wrap = |view: Self| wrap(Self { determinant: turn * view.determinant, ..view });
         Self::of_vertices(triangle.record, relative, front, x, illumination, cells, environment, wrap)
     }
 

@@ -41,6 +41,11 @@ impl<'a> PlacedTriangle<'a> {
         geometry::normal_and_area(cross, math::sqrt64(cross.length_squared()))
     }
 
+    /// Whether vertices run around the front the other way.
+    pub(in crate::light) fn is_mirrored(&self) -> bool {
+        self.placement.is_mirrored()
+    }
+
     /// Whether the environment shines in through the triangle.
     pub(crate) fn is_portal(&self) -> bool {
         self.record.is_portal()

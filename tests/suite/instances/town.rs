@@ -2,8 +2,8 @@
 //! vertices of the flattened scene are exact.
 
 use fanlight::{
-    Arity, Hit, Instance, InstanceId, LightSampler, LightSamplerBuilder, Mesh, MeshId, ObjectId, Sides, TextureId,
-    TriangleId, Weight,
+    Arity, Hit, Instance, InstanceId, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, ObjectId,
+    SampledLight, Sides, TextureId, TriangleId, Weight,
 };
 use glam::{Affine3A, DVec3, Mat3, Mat3A, Vec3, Vec3A};
 
@@ -194,6 +194,23 @@ impl Town {
         let [a, b, c] = mesh.vertices(flat.triangle.triangle as usize).map(Vec3::as_dvec3);
         let [b1, b2] = flat.barycentrics.map(f64::from);
         a * (1.0 - b1 - b2) + b * b1 + c * b2
+    }
+
+    /// Whether a hit is on a mirror image.
+    pub(crate) fn is_mirrored(&self, hit: &Hit) -> bool {
+        hit.instance.is_some_and(|i| self.instances[i.index() as usize].1.matrix3.determinant() < 0.0)
+    }
+
+    /// Whether there are textures.
+    pub(crate) fn is_textured(&self) -> bool {
+        !self.base.images.is_empty()
+    }
+
+    /// The sample on the flattened scene that a sample on the instances is.
+    pub(crate) fn flat_sample(&self, sample: &LightSample) -> LightSample {
+        let mut flat = *sample;
+        flat.light = SampledLight::Triangle(self.flat_hit(&sample.hit().expect("a triangle")));
+        flat
     }
 
     /// A point of the scene to look from: in the unit cube of one of the instances, or near it.
