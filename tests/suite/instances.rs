@@ -55,7 +55,7 @@ fn samples(at: &PointSampler<'_>, pcg: &mut Pcg32, count: usize) -> Vec<LightSam
 /// Within a triangle, an instance is sampled as the flattened triangle is.
 #[test]
 fn conditional_densities_are_those_of_flattened_triangles() {
-    let rounds: Vec<usize> = (0..48).collect();
+    let rounds = some(60);
     // Without bright features, which are no matter of single triangles.
     let all = towns(&rounds, 171, |number| [0, 1, 3][number % 3]);
     let found = parallel::map(all.len(), |i| {
@@ -87,7 +87,7 @@ fn conditional_densities_are_those_of_flattened_triangles() {
         compared
     });
     let compared: usize = found.iter().sum();
-    assert!(compared > 3000, "{compared} samples");
+    assert!(compared > 40 * rounds.len(), "{compared} samples");
 }
 
 /// All densities of a sample agree, those of rays and of split trees too.
@@ -120,7 +120,7 @@ fn check_agreement(lights: &LightSamplerView<'_>, x: &ShadingPoint, pcg: &mut Pc
 
 #[test]
 fn densities_agree() {
-    let rounds: Vec<usize> = (0..60).collect();
+    let rounds = some(60);
     let all = towns(&rounds, 172, |number| number % 5);
     let drawn = parallel::map(all.len(), |i| {
         let (town, mut pcg, number) = all[i].clone();
@@ -128,7 +128,7 @@ fn densities_agree() {
         let points = (0..10).map(|kind| point(&town, &mut pcg, kind)).collect::<Vec<_>>();
         points.iter().map(|x| check_agreement(&lights.as_view(), x, &mut pcg, 10)).sum::<usize>()
     });
-    assert!(drawn.iter().sum::<usize>() > 2000, "{drawn:?}");
+    assert!(drawn.iter().sum::<usize>() > 30 * rounds.len(), "{drawn:?}");
 }
 
 /// What a sample brings of one light.
@@ -153,12 +153,12 @@ fn check_irradiance(seed: u64, rounds: &[usize], sky: impl Fn(usize) -> usize + 
         let (town, mut pcg, number) = all[i].clone();
         let lights = town.build(ARITIES[number % 3]);
         let x = point(&town, &mut pcg, number % 3);
-        let exact = oracle::over_lights(&town.flat, &x, None, 1 << 17, &|m, t, b, direction| {
+        let exact = oracle::over_lights(&town.flat, &x, None, 1 << 16, &|m, t, b, direction| {
             oracle::sent(&town.flat, m, t, b, direction)
         });
         let at = lights.at(&x);
         let mut mean = Mean::default();
-        for _ in 0..40_000 {
+        for _ in 0..20_000 {
             let sample = at.sample(pcg.cube());
             mean.add(sample.map_or(0.0, |sample| brought(&town, &x, &sample) / f64::from(sample.pdf)));
         }
@@ -179,14 +179,14 @@ fn check_irradiance(seed: u64, rounds: &[usize], sky: impl Fn(usize) -> usize + 
 
 #[test]
 fn the_irradiance_is_that_of_an_integral() {
-    check_irradiance(173, &some(180), |number| [0, 1, 3][number % 3]);
+    check_irradiance(173, &some(120), |number| [0, 1, 3][number % 3]);
 }
 
 /// The probabilities of all triangles add up to that of a choice, and the densities of all points integrate to the share of
 /// samples that are no `None`.
 #[test]
 fn densities_integrate_to_the_rate_of_samples() {
-    let rounds = some(60);
+    let rounds = some(30);
     let all = towns(&rounds, 174, |number| number % 2);
     let found = parallel::map(all.len(), |i| {
         let (town, mut pcg, number) = all[i].clone();
@@ -229,7 +229,7 @@ fn pmf(at: &PointSampler<'_>, hit: &Hit) -> f32 {
 /// Triangles are drawn as often as their probabilities say.
 #[test]
 fn histograms_over_triangles_are_the_probabilities() {
-    let rounds: Vec<usize> = (0..36).collect();
+    let rounds = some(36);
     let all = towns(&rounds, 175, |number| number % 3);
     let count = tier().histogram;
     let found = parallel::map(all.len(), |i| {
@@ -281,7 +281,7 @@ fn noise(lights: &LightSampler, x: &ShadingPoint, pcg: &mut Pcg32, value: &dyn F
 /// The noise of instances, relative to that of the flattened scene, on the whole.
 #[test]
 fn instances_are_about_as_noisy_as_flattened_scenes() {
-    let found = parallel::map(2 * KINDS, |number| {
+    let found = parallel::map(KINDS, |number| {
         let mut pcg = Pcg32::new(number as u64, 176);
         let kind = number % KINDS;
         let lamp = vec![town::soup(&mut pcg, 60)];
@@ -366,7 +366,9 @@ fn suns_shine_through_instances() {
 /// Photons from instances bring the power of an integral, and their densities agree.
 #[test]
 fn photons_bring_the_power_of_an_integral() {
-    let found = parallel::map(24, |number| {
+    let rounds = some(24);
+    let found = parallel::map(rounds.len(), |i| {
+        let number = rounds[i];
         let mut pcg = Pcg32::new(number as u64, 178);
         let town = Town::random(&mut pcg, number % 5, number % 2 == 0, [0, 1][number / 2 % 2]);
         let lights = town.build(ARITIES[number % 3]);
