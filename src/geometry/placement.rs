@@ -47,7 +47,7 @@ impl Placement {
 
     /// Returns a point of the world in the object's space.
     #[inline]
-    pub(crate) fn to_local(&self, point: Vec3) -> DVec3 {
+    pub(crate) fn own_point(&self, point: Vec3) -> DVec3 {
         self.inverse * (point.as_dvec3() - self.translation)
     }
 
@@ -93,7 +93,7 @@ fn squared_length(matrix: &DMat3) -> f64 {
 
 /// Returns a bound on the length of what a matrix makes of a unit vector, exact for similarities.
 ///
-/// The squared lengths are between the eigenvalues of `MᵀM`. With their mean m and p² = ‖MᵀM - m‖² / 6, the largest is
+/// The squared lengths are between the eigenvalues of `MᵀM`. With their mean m and `p² = ‖MᵀM - m‖² / 6`, the largest is
 /// `m + 2 p cos φ` for some angle (the trigonometric solution of the cubic).
 pub(crate) fn norm(matrix: &DMat3) -> f64 {
     let square = matrix.transpose() * *matrix;

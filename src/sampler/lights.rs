@@ -42,7 +42,7 @@ pub struct LightSamplerView<'a> {
 pub struct ByteSizes {
     /// Tree over the lights.
     pub light_tree: usize,
-    /// The lights themselves, and the ways from ids to lights.
+    /// The lights themselves, and the ways from ids to lights; objects, with their own light trees, and instances.
     pub lights: usize,
     /// Trees over textures.
     pub texture_trees: usize,

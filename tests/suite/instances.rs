@@ -289,8 +289,8 @@ fn instances_are_about_as_noisy_as_flattened_scenes() {
         let town = Town::new(Scene::new("lamps", Vec::new()), vec![lamp], instances);
         let (lights, flat) = (town.build(Arity::Sixteen), town.flat.build(Arity::Sixteen));
         let mut sums = [0.0; 2];
-        for i in 0..8 {
-            let x = point(&town, &mut pcg, i % 3);
+        for i in 0..10 {
+            let x = point(&town, &mut pcg, i);
             let (mean, own) = noise(&lights, &x, &mut pcg, &|sample| brought(&town, &x, sample));
             let (_, other) = noise(&flat, &x, &mut pcg, &|sample| brought_flat(&town, &x, sample));
             if mean > 0.0 {
@@ -299,7 +299,7 @@ fn instances_are_about_as_noisy_as_flattened_scenes() {
                 sums[1] += (other / (mean * mean) + 1e-3).ln();
             }
         }
-        (kind, (sums[0] - sums[1]) / 8.0)
+        (kind, (sums[0] - sums[1]) / 10.0)
     });
     for kind in 0..KINDS {
         let ratios: Vec<f64> = found.iter().filter(|(k, _)| *k == kind).map(|(_, ratio)| *ratio).collect();

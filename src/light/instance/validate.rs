@@ -36,7 +36,8 @@ impl LightsView<'_> {
                 |leaf: u32| self.records.get(leaf as usize).and_then(LightTriangle::instance) == Some(i as u32);
             // An instance that can emit has lights.
             let is_absent = instance.leaf == NO_LEAF;
-            if !(is_absent || is_here(instance.leaf)) || (object.len() == 0 && !is_absent) {
+            let is_placed = is_here(instance.leaf) && object.len() > 0;
+            if !(is_absent || is_placed) {
                 return Err(Error::bytes("leaf of an instance", i, instance.leaf, self.records.len()));
             }
         }

@@ -133,7 +133,7 @@ impl<'a> ObjectWalk<'a> {
 
 /// Returns a point of the world in the object's space, and how far rounding may have moved it along each axis.
 fn own_position(placement: &Placement, position: Vec3) -> (Vec3, f32) {
-    let own = placement.to_local(position);
+    let own = placement.own_point(position);
     let size = own.abs().max_element();
     if size > f64::from(FARTHEST_POINT) {
         // Directions from there are about those from farther away.
