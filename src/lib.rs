@@ -58,6 +58,9 @@
 //! extent [`PointLight`] and [`SpotLight`]. [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a
 //! [`LightId`].
 //!
+//! What stands in a scene many times is built once: [`add_object`](LightSamplerBuilder::add_object) takes the meshes, and
+//! [`add_instance`](LightSamplerBuilder::add_instance) places them by any affine map ([`Instance`]).
+//!
 //! Photons start with [`LightSampler::emission`].
 //!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
