@@ -4,7 +4,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::instance::{AddedObject, InstanceRecord, PlacedObject};
+use super::instance::{self, AddedObject, InstanceRecord, PlacedObject};
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
 use super::{Energies, Illumination, Lamp, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF};
 use crate::blas::{self, CellNode, ImageTree, Procedural, RegisteredFunction, Root, Texture};
@@ -267,8 +267,7 @@ impl<'a> LightCollection<'a> {
             leaf_of,
             meshes: self.meshes,
             scales: Vec::new(),
-            objects: self.object_words,
-            instances: self.instances,
+            instances: instance::join(&self.instances, &self.object_words),
         }
     }
 

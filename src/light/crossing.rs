@@ -99,7 +99,7 @@ impl Lights {
     fn is_mixture_crossed_once(&self) -> bool {
         let mut triangles = Vec::new();
         for record in &self.records {
-            match Light::of(record, &self.instances, &self.objects) {
+            match Light::of(record, &self.instances) {
                 Light::Triangle(triangle) => triangles.push(*triangle),
                 Light::Lamp(lamp) if lamp.has_extent() => return false,
                 Light::Lamp(_) => {}

@@ -39,7 +39,6 @@ pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub use illumination::Illumination;
 pub use instance::Instance;
-use instance::InstanceRecord;
 pub(crate) use instance::{ObjectWalk, PlacedObject, PlacedTriangle};
 use lamp::LampRecord;
 pub(crate) use lamp::LampView;
@@ -84,10 +83,8 @@ buffers! {
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
-        /// Objects, as words one after the other.
-        objects: u32 = b"OBJE" version 1,
-        /// Instances of objects, by their ids.
-        instances: InstanceRecord = b"INST" version 1,
+        /// Instances and the objects that they place, as words (see [`instance`]). Empty without instances.
+        instances: u32 = b"INST" version 1,
     }
 }
 
@@ -325,11 +322,11 @@ impl LightView<'_> {
 impl<'a> Light<'a> {
     /// Returns the light of a record.
     #[inline(always)]
-    fn of(record: &'a LightTriangle, instances: &'a [InstanceRecord], objects: &'a [u32]) -> Self {
+    fn of(record: &'a LightTriangle, instances: &'a [u32]) -> Self {
         if record.index_and_flags & LightTriangle::LAMP == 0 {
             Light::Triangle(record)
         } else if let Some(instance) = record.instance() {
-            Light::Instance(PlacedObject::new(&instances[instance as usize], objects))
+            Light::Instance(PlacedObject::at(instances, instance))
         } else {
             Light::Lamp(bytemuck::cast_ref(record))
         }
@@ -377,7 +374,7 @@ impl<'a> LightsView<'a> {
     /// Returns the light in a leaf.
     #[inline(always)]
     pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
-        Light::of(&self.records[leaf as usize], self.instances, self.objects)
+        Light::of(&self.records[leaf as usize], self.instances)
     }
 
     /// Fetches the memory of the light in a leaf, so that a later look at it does not wait.

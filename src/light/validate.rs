@@ -17,7 +17,7 @@ impl LightsView<'_> {
         if let Some((leaf, number)) = instances().find(|instance| !is_instance(instance)) {
             return Err(Error::bytes("instance of a leaf", leaf as usize, number, self.instances.len()));
         }
-        let triangle = |record| Light::of(record, self.instances, self.objects).triangle();
+        let triangle = |record| Light::of(record, self.instances).triangle();
         let roots: Vec<blas::Root> = self.records.iter().filter_map(triangle).map(|triangle| triangle.root).collect();
         let lamps = self.records.len() - roots.len() - instances().count();
         Error::unless_equal("mark of lamps", self.has_lamps.into(), (lamps > 0).into())?;

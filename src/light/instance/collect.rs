@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use glam::Vec3;
 
 use super::object::{Object, ObjectParts};
-use super::{Instance, InstanceRecord};
+use super::{Instance, InstanceRecord, first_object};
 use crate::error::{Error, ErrorKind};
 use crate::geometry::Aabb;
 use crate::light::{Energies, Light, LightCollection, LightTriangle, Mesh, NO_LEAF};
@@ -127,7 +127,12 @@ impl<'a> LightCollection<'a> {
             starts.push(object.build(arity, energies, progress, &mut self.object_words)?);
         }
         self.instances.iter_mut().for_each(|instance| instance.object = starts[instance.number as usize]);
-        Ok(())
+        let (count, limit) = (first_object(self.instances.len()) + self.object_words.len(), u32::MAX as usize);
+        if count <= limit {
+            Ok(())
+        } else {
+            Err(Error(ErrorKind::TooMany { what: "words of instances and objects", count, limit }))
+        }
     }
 
     /// Number of the triangles of all objects that may emit.

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{PlacedObject, PlacedTriangle};
+use super::{PlacedObject, PlacedTriangle, records};
 use crate::light::{Light, LightKind, LightLeaf, LightTriangle, LightsView, LocalPoint, NO_LEAF};
 use crate::receiver::ShadingPoint;
 use crate::record::{InstanceId, TriangleId};
@@ -29,8 +29,8 @@ impl<'a> LightsView<'a> {
 
     /// Number of lights, where each triangle of an object counts once for each instance.
     pub(crate) fn count(&self) -> usize {
-        let placed = self.instances.iter().filter(|instance| instance.leaf != NO_LEAF);
-        let within = placed.map(|instance| PlacedObject::new(instance, self.objects).object.len() - 1);
+        let placed = records(self.instances).iter().filter(|instance| instance.leaf != NO_LEAF);
+        let within = placed.map(|instance| PlacedObject::new(instance, self.instances).object.len() - 1);
         within.fold(self.len(), usize::saturating_add)
     }
 
@@ -46,8 +46,8 @@ impl<'a> LightsView<'a> {
     /// Returns the leaf of a triangle of an instance; `None` for one that emits nothing or that was never added.
     #[inline(never)]
     pub(crate) fn leaf_within(&self, id: InstanceId, triangle: TriangleId) -> Option<LightLeaf> {
-        let record = self.instances.get(id.0 as usize).filter(|record| record.leaf != NO_LEAF)?;
-        let below = PlacedObject::new(record, self.objects).object.leaf(triangle)?;
+        let record = records(self.instances).get(id.0 as usize).filter(|record| record.leaf != NO_LEAF)?;
+        let below = PlacedObject::new(record, self.instances).object.leaf(triangle)?;
         Some(LightLeaf::within(record.leaf, below))
     }
 

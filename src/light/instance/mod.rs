@@ -16,6 +16,8 @@ mod update;
 mod validate;
 mod walk;
 
+use alloc::vec::Vec;
+
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Vec3};
 
@@ -154,6 +156,45 @@ fn corners([low, high]: [Vec3; 2]) -> impl Iterator<Item = Vec3> {
     (0..8).map(move |i| Vec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), high, low))
 }
 
+/// Words of a record. *Format.*
+const RECORD_WORDS: usize = size_of::<InstanceRecord>() / size_of::<u32>();
+
+/// Returns the first word of the first object after so many instances.
+fn first_object(instances: usize) -> usize {
+    1 + instances * RECORD_WORDS
+}
+
+/// Returns the records of all instances. *Format*: the words are the number of instances, their records, and the objects one
+/// after the other.
+#[inline]
+pub(super) fn records(words: &[u32]) -> &[InstanceRecord] {
+    let Some((&count, rest)) = words.split_first() else { return &[] };
+    let words = rest.get(..(count as usize).saturating_mul(RECORD_WORDS)).unwrap_or(&[]);
+    bytemuck::try_cast_slice(words).unwrap_or(&[])
+}
+
+/// Returns the records of all instances, to be changed.
+fn records_mut(words: &mut [u32]) -> &mut [InstanceRecord] {
+    let Some((&mut count, rest)) = words.split_first_mut() else { return &mut [] };
+    let words = rest.get_mut(..(count as usize).saturating_mul(RECORD_WORDS)).unwrap_or(&mut []);
+    bytemuck::try_cast_slice_mut(words).unwrap_or(&mut [])
+}
+
+/// Returns the words of instances and objects, in which the records number the words from the first object; none without
+/// instances.
+pub(super) fn join(instances: &[InstanceRecord], objects: &[u32]) -> Vec<u32> {
+    if instances.is_empty() {
+        return Vec::new();
+    }
+    let first = first_object(instances.len());
+    let mut words = Vec::with_capacity(first + objects.len());
+    words.push(instances.len() as u32);
+    words.extend_from_slice(bytemuck::cast_slice(instances));
+    words.extend_from_slice(objects);
+    records_mut(&mut words).iter_mut().for_each(|record| record.object += first as u32);
+    words
+}
+
 /// An instance with its object: a leaf of the tree over all lights.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlacedObject<'a> {
@@ -162,10 +203,16 @@ pub(crate) struct PlacedObject<'a> {
 }
 
 impl<'a> PlacedObject<'a> {
-    /// Returns the instance with the object that it places.
+    /// Returns the instance with the object that it places, whose words are among these.
     #[inline]
-    pub(super) fn new(record: &'a InstanceRecord, objects: &'a [u32]) -> Self {
-        Self { record, object: Object::at(objects, record.object) }
+    pub(super) fn new(record: &'a InstanceRecord, words: &'a [u32]) -> Self {
+        Self { record, object: Object::at(words, record.object) }
+    }
+
+    /// Returns the instance of a number by the words of all.
+    #[inline]
+    pub(super) fn at(words: &'a [u32], number: u32) -> Self {
+        Self::new(&records(words)[number as usize], words)
     }
 
     /// Number of the object's triangles.

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::{Instance, InstanceRecord, Object};
+use super::{Instance, InstanceRecord, Object, records, records_mut};
 use crate::error::{Error, ErrorKind};
 use crate::light::Lights;
 use crate::record::{InstanceId, ObjectId};
@@ -12,21 +12,23 @@ impl Lights {
     pub(crate) fn update_instances(&mut self, updates: &[(InstanceId, Instance)]) -> Result<(), Error> {
         let replace = |&(InstanceId(number), instance): &(InstanceId, Instance)| {
             let number = number as usize;
-            let instances = self.instances.len();
+            let records = records(&self.instances);
+            let instances = records.len();
             let unknown = Error(ErrorKind::UnknownInstance { instance: number, instances });
-            let current = self.instances.get(number).ok_or(unknown)?;
+            let current = records.get(number).ok_or(unknown)?;
             let ObjectId(object) = instance.object;
             if object != current.number {
                 let expected = current.number;
                 return Err(Error(ErrorKind::OtherObject { instance: number, object, expected }));
             }
-            let corners = Object::at(&self.objects, current.object).corners();
+            let corners = Object::at(&self.instances, current.object).corners();
             let record = InstanceRecord::new(&instance, number, current.object, corners)?;
             Ok((number, InstanceRecord { leaf: current.leaf, ..record }))
         };
         let replaced: Vec<(usize, InstanceRecord)> = updates.iter().map(replace).collect::<Result<_, _>>()?;
+        let records = records_mut(&mut self.instances);
         for (number, record) in replaced {
-            self.instances[number] = record;
+            records[number] = record;
         }
         Ok(())
     }

@@ -3,8 +3,8 @@
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
-use super::InstanceRecord;
 use super::object::{Object, Parts};
+use super::{InstanceRecord, first_object, records};
 use crate::blas;
 use crate::error::Error;
 use crate::light::{LightTriangle, LightsView, NO_AREA, NO_LEAF, POSITION_LIMIT};
@@ -12,23 +12,25 @@ use crate::light::{LightTriangle, LightsView, NO_AREA, NO_LEAF, POSITION_LIMIT};
 impl LightsView<'_> {
     /// Checks that every object is whole and sound, and that instances and leaves refer to each other.
     pub(in crate::light) fn validate_instances(&self) -> Result<(), Error> {
+        let (all, records) = (self.instances, records(self.instances));
+        Error::unless_equal("number of instances", records.len(), all.first().map_or(0, |&count| count as usize))?;
         let mut starts = BTreeSet::new();
-        let mut start = 0;
-        while start < self.objects.len() {
-            let object = Object::at(self.objects, u32::try_from(start).unwrap_or(u32::MAX));
+        let mut start = first_object(records.len()).min(all.len());
+        while start < all.len() {
+            let object = Object::at(all, u32::try_from(start).unwrap_or(u32::MAX));
             let words = object.header.words as usize;
-            if Object::word_count(object.header) != Some(words) || words > self.objects.len() - start {
-                return Err(Error::bytes("number of words of an object", start, words, self.objects.len() - start));
+            if Object::word_count(object.header) != Some(words) || words > all.len() - start {
+                return Err(Error::bytes("number of words of an object", start, words, all.len() - start));
             }
             self.validate_object(&object, start)?;
             starts.insert(start as u32);
             start += words;
         }
-        for (i, instance) in self.instances.iter().enumerate() {
+        for (i, instance) in records.iter().enumerate() {
             if !starts.contains(&instance.object) {
-                return Err(Error::bytes("object of an instance", i, instance.object, self.objects.len()));
+                return Err(Error::bytes("object of an instance", i, instance.object, all.len()));
             }
-            let object = Object::at(self.objects, instance.object);
+            let object = Object::at(all, instance.object);
             if instance.check(object.corners()).is_err() {
                 return Err(Error::bytes("transform or factor of an instance", i, 0, 0));
             }
@@ -46,7 +48,7 @@ impl LightsView<'_> {
 
     /// Whether the instance that a record stands for knows the record's leaf.
     pub(in crate::light) fn is_instance_at(&self, number: u32, leaf: u32) -> bool {
-        self.instances.get(number as usize).is_some_and(|instance: &InstanceRecord| instance.leaf == leaf)
+        records(self.instances).get(number as usize).is_some_and(|instance: &InstanceRecord| instance.leaf == leaf)
     }
 
     fn validate_object(&self, object: &Object<'_>, start: usize) -> Result<(), Error> {
