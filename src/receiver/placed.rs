@@ -87,8 +87,9 @@ impl<L: Lobe> PlacedLobe<L> {
     /// Returns the image of a vector.
     #[inline(always)]
     fn mapped(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        let [a, b, c] = self.columns;
-        [0, 1, 2].map(|i| a[i] * x + b[i] * y + c[i] * z)
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = self.columns;
+        // Not a map, whose closure would be compiled for the baseline.
+        [ax * x + bx * y + cx * z, ay * x + by * y + cy * z, az * x + bz * y + cz * z]
     }
 }
 

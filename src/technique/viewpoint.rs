@@ -104,7 +104,9 @@ impl LeafOracle for Viewpoint<'_> {
 
     #[inline]
     fn is_visible(&self, leaf: u32) -> bool {
-        self.scene.lights.energy > 0.0 && self.scene.lights.light(leaf).is_visible(&self.x)
+        let lights = &self.scene.lights;
+        // As with any cluster of lights, that of an instance is left to what is inside.
+        lights.energy > 0.0 && (lights.is_instance(leaf) || lights.light(leaf).is_visible(&self.x))
     }
 
     fn irradiance_per_area(&self, leaf: u32) -> f32 {

@@ -34,6 +34,12 @@ impl<'a> LightsView<'a> {
         within.fold(self.len(), usize::saturating_add)
     }
 
+    /// Whether a leaf is an instance.
+    #[inline(always)]
+    pub(crate) fn is_instance(&self, leaf: u32) -> bool {
+        self.records[leaf as usize].instance().is_some()
+    }
+
     /// Returns the instance in a leaf; `None` for a light of its own.
     #[inline]
     pub(crate) fn instance(&self, leaf: u32) -> Option<PlacedObject<'a>> {

@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::{Object, PlacedObject, PlacedTriangle};
 use crate::env::EnvironmentView;
 use crate::geometry::{Placement, norm};
+use crate::light::LightTriangle;
 use crate::light::triangle_view::FARTHEST_POINT;
 use crate::math::{at_least, only_if};
 use crate::receiver::{PlacedLobe, RoundedPoint, ShadingPoint, for_lobe, own_receiver};
@@ -30,6 +31,8 @@ const LANES: usize = 16;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObjectWalk<'a> {
     tree: TlasView<'a>,
+    /// Triangles, in the order of the tree's leaves.
+    records: &'a [LightTriangle],
     object: Object<'a>,
     pub(super) placement: Placement,
     /// Shading point in the world.
@@ -75,11 +78,12 @@ impl<'a> ObjectWalk<'a> {
         if !x.position.to_array().iter().all(|x| x.abs() <= FARTHEST_POINT) {
             return None;
         }
-        let placement = placed.record.placement();
+        let (placement, parts) = (placed.record.placement(), placed.object.parts());
         let (receiver, normal_length) = own_receiver(x.receiver, &placement.linear);
         let (position, margin) = own_position(&placement, x.position);
         Some(Self {
-            tree: placed.object.tree(),
+            tree: parts.tree,
+            records: parts.records,
             object: placed.object,
             x: *x,
             own: ShadingPoint { position, receiver },
@@ -127,7 +131,7 @@ impl<'a> ObjectWalk<'a> {
     }
 
     fn triangle(&self, below: u32) -> PlacedTriangle<'a> {
-        PlacedTriangle::new(&self.object.records()[below as usize], self.placement)
+        PlacedTriangle::new(&self.records[below as usize], self.placement)
     }
 }
 
