@@ -1,5 +1,6 @@
 //! The one error type of the crate.
 
+use alloc::boxed::Box;
 use core::fmt;
 
 use crate::progress::Cancelled;
@@ -91,6 +92,20 @@ pub(crate) enum ErrorKind {
     UnknownProfile { light: usize, profile: usize, profiles: usize },
     /// A distant light in the place of one that is somewhere, or the other way round.
     DistantReplaced { light: usize },
+    /// What is wrong with a mesh of an object.
+    InObject { object: usize, kind: Box<ErrorKind> },
+    /// A mesh of an object that is not in all light groups.
+    GroupsInObject { object: usize, mesh: usize },
+    /// An object without triangles.
+    EmptyObject { object: usize },
+    /// A handle to an object that this builder did not give out.
+    UnknownObject { instance: usize, object: usize, objects: usize },
+    /// An instance of which a number is NaN, infinite or out of its range.
+    Instance { instance: usize, what: &'static str, value: f32, expected: &'static str },
+    /// A changed instance of another object than before.
+    OtherObject { instance: usize, object: u32, expected: u32 },
+    /// An instance that a sampler does not hold.
+    UnknownInstance { instance: usize, instances: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -107,7 +122,13 @@ pub(crate) enum ErrorKind {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.0 {
+        self.0.fmt(f)
+    }
+}
+
+impl fmt::Display for ErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             ErrorKind::ImageSize { what, width, height, limit } => {
                 write!(f, "{what}: {width} x {height} texels, but each side must be from 1 to {limit}")
             }
@@ -182,6 +203,26 @@ impl fmt::Display for Error {
             }
             ErrorKind::DistantReplaced { light } => {
                 write!(f, "light {light}: a distant light can only take the place of a distant light")
+            }
+            ErrorKind::InObject { object, kind } => write!(f, "object {object}: {kind}"),
+            ErrorKind::GroupsInObject { object, mesh } => {
+                write!(f, "object {object}: mesh {mesh} has light groups, but those of an instance count")
+            }
+            ErrorKind::EmptyObject { object } => write!(f, "object {object} has no triangles"),
+            ErrorKind::UnknownObject { instance, object, objects } => {
+                write!(f, "instance {instance}: object {object} was never added, this builder has {objects}")
+            }
+            ErrorKind::Instance { instance, what, value, expected } => {
+                write!(f, "instance {instance}: the {what} is {value}, but must be {expected}")
+            }
+            ErrorKind::OtherObject { instance, object, expected } => {
+                write!(
+                    f,
+                    "instance {instance}: it is one of object {object} now, but was added as one of object {expected}"
+                )
+            }
+            ErrorKind::UnknownInstance { instance, instances } => {
+                write!(f, "instance {instance} was never added, this sampler has {instances}")
             }
             ErrorKind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             ErrorKind::Cancelled => write!(f, "the build was cancelled"),

@@ -58,6 +58,9 @@
 //! extent [`PointLight`] and [`SpotLight`]. [`DistantLight`]s are in no tree and compete with it. [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a
 //! [`LightId`].
 //!
+//! What stands in a scene many times is built once: [`add_object`](LightSamplerBuilder::add_object) takes the meshes, and
+//! [`add_instance`](LightSamplerBuilder::add_instance) places them by any affine map ([`Instance`]).
+//!
 //! Photons start with [`LightSampler::emission`]. In participating media, [`LightSampler::along`] chooses a distance along a
 //! ray.
 //!
@@ -163,11 +166,14 @@ pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
 pub use light::{
-    DiskLight, DistantLight, Illumination, Lamp, Mesh, MeshUpdate, PointLight, Profile, ProfileLight, Sides,
+    DiskLight, DistantLight, Illumination, Instance, Lamp, Mesh, MeshUpdate, PointLight, Profile, ProfileLight, Sides,
     SphereLight, SpotLight, TubeLight, Weight,
 };
 pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
-pub use record::{Filter, Hit, LightId, LightSample, MeshId, ProfileId, SampledLight, TextureId, TriangleId, Wrap};
+pub use record::{
+    Filter, Hit, InstanceId, LightId, LightSample, MeshId, ObjectId, ProfileId, SampledLight, TextureId, TriangleId,
+    Wrap,
+};
 pub use sampler::{
     ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler, RaySegment,
     ResampledLight, SegmentSample, SegmentSampler, VisibilityCounters, VisibilityLearner,

@@ -3,10 +3,10 @@
 use core::hint::black_box;
 
 use fanlight::{
-    Environment, Glossy, Hit, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver, ShadingPoint,
-    Splitting, Texture, TriangleId, Weight,
+    Environment, Glossy, Hit, Instance, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver,
+    ShadingPoint, Splitting, Texture, TriangleId, Weight,
 };
-use glam::Vec3;
+use glam::{Affine3A, Quat, Vec3};
 use smallvec::SmallVec;
 
 use crate::scenes::pcg::Pcg32;
@@ -107,6 +107,12 @@ pub(crate) const ALL: &[Case] = &[
         calls: CALLS,
         run: || environment_light(|lights, x, u| lights.at(x).pdf_environment(Vec3::from(u) - 0.5)),
     },
+    Case { name: "street/sample", calls: CALLS, run: || street(Street::Instances, false) },
+    Case { name: "street/nee", calls: CALLS, run: || street(Street::Instances, true) },
+    Case { name: "street-stretched/sample", calls: CALLS, run: || street(Street::Stretched, false) },
+    Case { name: "street-stretched/nee", calls: CALLS, run: || street(Street::Stretched, true) },
+    Case { name: "street-flattened/sample", calls: CALLS, run: || street(Street::Flattened, false) },
+    Case { name: "street-flattened/nee", calls: CALLS, run: || street(Street::Flattened, true) },
 ];
 
 /// A point of a triangle that no workload has: its density costs what the first call at a shading point finds for all, and
@@ -319,5 +325,68 @@ fn environment_light(call: fn(&LightSampler, &ShadingPoint, [f32; 3]) -> f32) {
     let (points, numbers) = (scenes::scene("window").points.timing(CALLS), numbers());
     measured(|i| {
         black_box(call(&lights, &points[i], numbers[i]));
+    });
+}
+
+/// How the lamps of a street are passed in.
+#[derive(Clone, Copy, PartialEq)]
+enum Street {
+    /// One object, turned and scaled evenly.
+    Instances,
+    /// One object, each lamp stretched by its own factor.
+    Stretched,
+    /// The lamps of [`Street::Instances`] as a mesh each.
+    Flattened,
+}
+
+/// Four hundred lamps of two hundred triangles, and points between them.
+fn street(kind: Street, with_density: bool) {
+    let mut pcg = Pcg32::new(8, 8);
+    let mut positions = Vec::new();
+    let mut indices = Vec::new();
+    // A ball of facets that face outwards.
+    for i in 0..200 {
+        let out = pcg.direction().as_vec3();
+        let (s, t) = out.any_orthonormal_pair();
+        positions.extend([out * 0.2, out * 0.2 + s * 0.02, out * 0.2 + t * 0.02]);
+        indices.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    let transforms: Vec<Affine3A> = (0..400)
+        .map(|i| {
+            let [u, v, w] = pcg.uniform3();
+            let turn = Quat::from_axis_angle(pcg.direction().as_vec3(), 6.0 * u);
+            let stretch = if kind == Street::Stretched { 0.5 + 1.5 * w } else { 1.0 };
+            let place = Vec3::new((i % 20) as f32 * 2.0, (i / 20) as f32 * 2.0, 1.0);
+            Affine3A::from_scale_rotation_translation((0.5 + v) * Vec3::new(1.0, 1.0, stretch), turn, place)
+        })
+        .collect();
+    let mut builder = LightSampler::builder();
+    if kind == Street::Flattened {
+        for transform in &transforms {
+            let moved: Vec<Vec3> = positions.iter().map(|p| transform.transform_point3(*p)).collect();
+            builder.add_mesh(&Mesh::emitter(&moved, &indices)).expect("the lamp is sound");
+        }
+    } else {
+        let lamp = builder.add_object(&[Mesh::emitter(&positions, &indices)]).expect("the lamp is sound");
+        for transform in &transforms {
+            builder.add_instance(Instance::new(lamp, *transform)).expect("the place is sound");
+        }
+    }
+    let lights = builder.build().expect("the street is small");
+    let points: Vec<ShadingPoint> = (0..CALLS)
+        .map(|_| {
+            let [u, v, w] = pcg.uniform3();
+            ShadingPoint::surface(Vec3::new(38.0 * u, 38.0 * v, 0.5 * w), Vec3::Z)
+        })
+        .collect();
+    let numbers = numbers();
+    measured(|i| {
+        let here = lights.at(&points[i]);
+        if let Some(sample) = here.sample(numbers[i]) {
+            if with_density {
+                black_box(here.pdf_sample_direction(&sample));
+            }
+            black_box(sample);
+        }
     });
 }

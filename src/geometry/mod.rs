@@ -3,11 +3,13 @@
 mod aabb;
 mod cone;
 mod horizon;
+mod placement;
 mod polygon;
 mod triangle;
 
 pub(crate) use aabb::Aabb;
 pub(crate) use cone::{Cone, angle};
 pub(crate) use horizon::{HORIZON_ROUNDING, horizon, is_below};
+pub(crate) use placement::{Placement, norm};
 pub(crate) use polygon::Polygon;
 pub(crate) use triangle::{Triangle, cross_plane, intersect, normal_and_area, subdivision_centers};

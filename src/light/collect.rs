@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 
 use super::distant::{self, DistantRecord};
 use super::extras;
+use super::instance::{self, AddedObject, InstanceRecord, PlacedObject};
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
 use super::meshes::mesh_of;
 use super::profile::{Profile, ProfileCollection};
@@ -31,13 +32,13 @@ enum WeightTexture<'a> {
 pub(crate) struct LightCollection<'a> {
     textures: Vec<WeightTexture<'a>>,
     /// Triangles that may emit light.
-    triangles: Vec<LightTriangle>,
+    pub(super) triangles: Vec<LightTriangle>,
     /// For every triangle that was added, its index in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
-    indices: Vec<u32>,
+    pub(super) indices: Vec<u32>,
     /// Where each mesh starts in `indices`, and the end.
-    meshes: Vec<u32>,
+    pub(super) meshes: Vec<u32>,
     /// Light groups of each mesh.
-    mesh_groups: Vec<u32>,
+    pub(super) mesh_groups: Vec<u32>,
     /// Lights that are not made of triangles.
     lamps: Vec<LampRecord>,
     /// Light groups of each.
@@ -54,7 +55,15 @@ pub(crate) struct LightCollection<'a> {
     images: Vec<ImageTree<'a>>,
     shared_images: BTreeMap<TreeKey, u32>,
     /// Triangles, by their places in `indices`, with the numbers of their trees over images.
-    pending: Vec<(u32, u32)>,
+    pub(super) pending: Vec<(u32, u32)>,
+    /// Objects that are still to be built.
+    pub(super) objects: Vec<AddedObject>,
+    /// Objects that are built, as words.
+    pub(super) object_words: Vec<u32>,
+    pub(super) instances: Vec<InstanceRecord>,
+    /// Light groups of each.
+    pub(super) instance_groups: Vec<u32>,
+    pub(super) objects_have_portals: bool,
 }
 
 /// A texture and the bits of the three uvs: what a tree depends on.
@@ -85,6 +94,11 @@ impl<'a> LightCollection<'a> {
             images: Vec::new(),
             shared_images: BTreeMap::new(),
             pending: Vec::new(),
+            objects: Vec::new(),
+            object_words: Vec::new(),
+            instances: Vec::new(),
+            instance_groups: Vec::new(),
+            objects_have_portals: false,
         }
     }
 
@@ -154,7 +168,7 @@ impl<'a> LightCollection<'a> {
 
     /// Number of lights that may emit, by what is known of them.
     pub(crate) fn light_count(&self) -> usize {
-        self.triangles.len() + self.lamps.len()
+        self.triangles.len() + self.lamps.len() + self.instances.len()
     }
 
     /// Builds the trees over images, and packs the profiles. Only then the lights are complete.
@@ -174,6 +188,19 @@ impl<'a> LightCollection<'a> {
         for (tree, root) in order.into_iter().zip(built) {
             roots[tree as usize] = root;
         }
+        self.set_roots(&roots);
+        let mut objects = core::mem::take(&mut self.objects);
+        for object in &mut objects {
+            self.exchange_meshes(object);
+            self.set_roots(&roots);
+            self.exchange_meshes(object);
+        }
+        self.objects = objects;
+        Ok(())
+    }
+
+    /// Gives the triangles that wait for trees over images their roots.
+    fn set_roots(&mut self, roots: &[Root]) {
         for (at, tree) in core::mem::take(&mut self.pending) {
             let (index, root) = (&mut self.indices[at as usize], roots[tree as usize]);
             if let Some(triangle) = self.triangles.get_mut(*index as usize) {
@@ -183,7 +210,6 @@ impl<'a> LightCollection<'a> {
             }
         }
         self.remove_black();
-        Ok(())
     }
 
     /// Removes the triangles on which an image turned out to be black.
@@ -207,28 +233,32 @@ impl<'a> LightCollection<'a> {
         }
     }
 
-    /// Returns a light by its index among those that may emit: first the triangles, then the lamps.
+    /// Returns a light by its index among those that may emit: first the triangles, then the lamps, then the instances.
     pub(crate) fn light(&self, index: u32) -> Light<'_> {
         let index = index as usize;
         match self.triangles.get(index) {
             Some(triangle) => Light::Triangle(triangle),
-            None => Light::Lamp(LampLight {
-                record: &self.lamps[index - self.triangles.len()],
-                extras: Extras(&self.packed),
-            }),
+            None => match self.lamps.get(index - self.triangles.len()) {
+                Some(record) => Light::Lamp(LampLight { record, extras: Extras(&self.packed) }),
+                None => {
+                    let instance = &self.instances[index - self.triangles.len() - self.lamps.len()];
+                    Light::Instance(PlacedObject::new(instance, &self.object_words))
+                }
+            },
         }
     }
 
     /// Returns the light groups of some lights by their indices; nothing if all lights are in all groups.
     pub(crate) fn groups(&self, lights: &[u32]) -> Vec<u32> {
         let all = [self.environment_groups];
-        let mut groups = self.mesh_groups.iter().chain(&self.lamp_groups).chain(&all);
+        let mut groups = self.mesh_groups.iter().chain(&self.lamp_groups).chain(&self.instance_groups).chain(&all);
         if groups.all(|groups| *groups == ALL_GROUPS) {
             return Vec::new();
         }
         let groups = |index: u32| match self.light(index) {
             Light::Triangle(triangle) => self.mesh_groups[mesh_of(&self.meshes, triangle.index())],
             Light::Lamp(lamp) => self.lamp_groups[lamp.record.number() as usize],
+            Light::Instance(_) => self.instance_groups[index as usize - self.triangles.len() - self.lamps.len()],
         };
         lights.iter().map(|&light| groups(light)).collect()
     }
@@ -244,7 +274,7 @@ impl<'a> LightCollection<'a> {
     ///
     /// If there are more of them than leaves in a tree.
     pub(crate) fn emitting(&self, energies: &Energies<'_>) -> Result<Vec<u32>, Error> {
-        let emits = parallel::collect(self.light_count(), |i| energies.energy(self.light(i as u32)) > 0.0);
+        let emits = parallel::collect(self.light_count(), |i| energies.may_emit(self.light(i as u32)));
         let emitting: Vec<u32> = (0..).zip(emits).filter_map(|(i, emits)| emits.then_some(i)).collect();
         if emitting.len() > MAX_LEAVES {
             let count = emitting.len();
@@ -254,21 +284,28 @@ impl<'a> LightCollection<'a> {
     }
 
     /// Returns the lights with these indices, in the order of leaves that is given.
-    pub(crate) fn into_lights(self, illumination: Illumination, leaves: &[u32]) -> Lights {
-        let has_portals = self.triangles.iter().any(LightKind::is_portal);
+    pub(crate) fn into_lights(mut self, illumination: Illumination, leaves: &[u32]) -> Lights {
+        let has_portals = self.triangles.iter().any(LightKind::is_portal) || self.objects_have_portals;
         let first_lamp = self.triangles.len() as u32;
+        let first_instance = first_lamp + self.lamps.len() as u32;
         let mut leaf_of_index = vec![NO_LEAF; self.light_count()];
         for (leaf, &index) in (0..).zip(leaves) {
             leaf_of_index[index as usize] = leaf;
         }
         let leaf_of = |&index: &u32| leaf_of_index.get(index as usize).copied().unwrap_or(index);
-        let lamp_leaves = &leaf_of_index[first_lamp as usize..];
+        let lamp_leaves = &leaf_of_index[first_lamp as usize..first_instance as usize];
         let leaf_of = self.indices.iter().map(leaf_of).chain(lamp_leaves.iter().copied()).collect();
         let record = |leaf: usize| match leaves[leaf].checked_sub(first_lamp) {
             None => self.triangles[leaves[leaf] as usize],
-            Some(lamp) => self.lamps[lamp as usize].into_triangle(),
+            Some(number) => match self.lamps.get(number as usize) {
+                Some(lamp) => lamp.into_triangle(),
+                None => LightTriangle::of_instance(leaves[leaf] - first_instance),
+            },
         };
         let records = parallel::collect(leaves.len(), record);
+        for (instance, leaf) in self.instances.iter_mut().zip(&leaf_of_index[first_instance as usize..]) {
+            instance.leaf = *leaf;
+        }
         let mut groups = self.groups(leaves);
         if !groups.is_empty() || self.environment_groups != ALL_GROUPS {
             groups.push(self.environment_groups);
@@ -285,7 +322,7 @@ impl<'a> LightCollection<'a> {
             illumination,
             energy: 0.0,
             has_portals,
-            has_lamps: leaves.iter().any(|&index| index >= first_lamp),
+            has_lamps: leaves.iter().any(|index| (first_lamp..first_instance).contains(index)),
             is_crossed_once: false,
             records,
             cells: self.cells,
@@ -293,6 +330,7 @@ impl<'a> LightCollection<'a> {
             meshes: self.meshes,
             scales: Vec::new(),
             extras,
+            instances: instance::join(&self.instances, &self.object_words),
         }
     }
 

@@ -16,6 +16,11 @@ use crate::math::sqrt64;
 /// Larger: a build compares each light with more planes before it gives up. Smaller: bodies of many faces are not recognized.
 const MAX_PLANES: usize = 64;
 
+/// Most triangles of instances that are looked at one by one. *Chosen*: the windows of a large house.
+///
+/// Larger: builds and refits of scenes of many instances take longer. Smaller: rooms with more windows are not recognized.
+const MOST_PLACED: usize = 4096;
+
 /// Largest distance of a vertex from a plane that it counts as lying in, relative to the coordinates of both. *Chosen*: rounding
 /// to `f32` moves a vertex by at most 1.04e-7 of them (√3 · 2⁻²⁴). A ray that meets two lights of what counts as one plane runs
 /// along both, at an angle of at most this distance over their size.
@@ -83,18 +88,27 @@ fn extent(light: &LightTriangle) -> f64 {
 impl Lights {
     /// Finds out whether a ray meets at most one light that shines back along it.
     pub(crate) fn find_crossings(&mut self) {
-        self.is_crossed_once =
-            if self.has_lamps { self.is_mixture_crossed_once() } else { is_crossed_once(&self.records) };
+        self.is_crossed_once = if self.has_lamps || !self.instances.is_empty() {
+            self.is_mixture_crossed_once()
+        } else {
+            is_crossed_once(&self.records)
+        };
     }
 
-    /// Whether a ray meets at most one of lights among which are lamps.
+    /// Whether a ray meets at most one of lights among which are lamps or instances.
     fn is_mixture_crossed_once(&self) -> bool {
         let mut triangles = Vec::new();
         for record in &self.records {
-            match Light::of(record, Extras::NONE) {
+            match Light::of(record, Extras::NONE, &self.instances) {
                 Light::Triangle(triangle) => triangles.push(*triangle),
                 Light::Lamp(lamp) if lamp.record.has_extent() => return false,
                 Light::Lamp(_) => {}
+                Light::Instance(placed) => {
+                    if triangles.len() + placed.object.len() > MOST_PLACED {
+                        return false;
+                    }
+                    triangles.extend(placed.flattened());
+                }
             }
         }
         is_crossed_once(&triangles)

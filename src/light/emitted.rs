@@ -4,7 +4,7 @@ use core::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::{DVec3, Vec3};
 
-use super::{Light, LightKind, LightPoint, LightTriangle, LightsView, LocalPoint};
+use super::{Light, LightKind, LightLeaf, LightPoint, LightTriangle, LightsView, LocalPoint};
 use crate::blas::{self, ARITY, CellNode, CellTarget, Draw, Follow, Guide, Lattice, LatticeCell};
 use crate::math;
 use crate::warp::Variate;
@@ -47,12 +47,12 @@ impl LightsView<'_> {
     /// the side of a light of two sides.
     pub(crate) fn emit(
         &self,
-        leaf: u32,
+        leaf: LightLeaf,
         point: [Variate; 2],
         direction: [Variate; 2],
         side: f64,
     ) -> Option<EmittedRay> {
-        if let Light::Lamp(lamp) = self.light(leaf) {
+        if let Light::Lamp(lamp) = self.light(leaf.top) {
             return (lamp.weight() > 0.0).then(|| lamp.emit(point, direction, side));
         }
         let EmissionStart { point, position, normal, two_sided, pdf_area } = self.sample_start(leaf, point)?;
@@ -63,7 +63,7 @@ impl LightsView<'_> {
 
     /// Returns the density with which [`Self::emit`] draws the ray from a given point of a light in a unit direction.
     pub(crate) fn emission_pdf(&self, LightPoint { leaf, point }: LightPoint, direction: Vec3) -> f64 {
-        if let Light::Lamp(lamp) = self.light(leaf) {
+        if let Light::Lamp(lamp) = self.light(leaf.top) {
             return if lamp.weight() > 0.0 { lamp.emission_pdf(direction) } else { 0.0 };
         }
         let Some(start) = self.start_at(leaf, point) else { return 0.0 };
@@ -74,44 +74,52 @@ impl LightsView<'_> {
     }
 
     /// Draws a point of a triangle that light leaves from; `None` for one that is switched off, and for a lamp.
-    pub(crate) fn sample_start(&self, leaf: u32, u: [Variate; 2]) -> Option<EmissionStart> {
+    pub(crate) fn sample_start(&self, leaf: LightLeaf, u: [Variate; 2]) -> Option<EmissionStart> {
         self.start(leaf, &mut Draw::new(u), Draw::point)
     }
 
     /// Returns a given point of a triangle with the density with which [`Self::sample_start`] draws it.
-    pub(crate) fn start_at(&self, leaf: u32, point: LocalPoint) -> Option<EmissionStart> {
+    pub(crate) fn start_at(&self, leaf: LightLeaf, point: LocalPoint) -> Option<EmissionStart> {
         let point = point.lattice();
         self.start(leaf, &mut Follow::new(point), |_, _| point)
     }
 
     fn start<G: Guide>(
         &self,
-        leaf: u32,
+        leaf: LightLeaf,
         guide: &mut G,
         point: impl Fn(&G, LatticeCell) -> Lattice,
     ) -> Option<EmissionStart> {
         if self.scale(leaf) == 0.0 {
             return None;
         }
-        match self.light(leaf) {
-            Light::Triangle(triangle) => start_on_triangle(triangle, self.cells, guide, point),
+        match self.light(leaf.top) {
+            Light::Triangle(light) => {
+                let triangle = light.triangle();
+                let shape = (triangle.normal_and_area()?, triangle.exactly_relative_to(Vec3::ZERO));
+                start_on_triangle(light, shape, self.cells, guide, point)
+            }
             Light::Lamp(_) => None,
+            Light::Instance(placed) => {
+                let triangle = placed.triangle(leaf.below()?);
+                let shape = (triangle.normal_and_area()?, triangle.exactly_relative_to(Vec3::ZERO));
+                start_on_triangle(triangle.record, shape, self.cells, guide, point)
+            }
         }
     }
 }
 
+/// Returns a point of a triangle of which normal, area and vertices are given.
 fn start_on_triangle<G: Guide>(
     light: &LightTriangle,
+    ((normal, area), [v0, v1, v2]): ((Vec3, f32), [DVec3; 3]),
     cells: &[CellNode],
     guide: &mut G,
     point: impl Fn(&G, LatticeCell) -> Lattice,
 ) -> Option<EmissionStart> {
-    let triangle = light.triangle();
-    let (normal, area) = triangle.normal_and_area()?;
     let (cell, pmf) = blas::descend(cells, light.root, &Everywhere, guide)?;
     let point = point(guide, cell);
     let [b1, b2] = point.to_barycentrics().map(f64::from);
-    let [v0, v1, v2] = triangle.exactly_relative_to(Vec3::ZERO);
     Some(EmissionStart {
         point,
         position: v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2,

@@ -1,5 +1,6 @@
 //! What each light sends, as the tree over the lights needs to know it.
 
+use super::instance::emits;
 use super::{Light, LightKind};
 use crate::bounds::{LightBounds, Moments};
 use crate::env::Environment;
@@ -40,6 +41,10 @@ impl<'a> Energies<'a> {
 
     /// Returns weight times what it is multiplied by to compete ([`LightKind::area`]), times mean radiance for a portal. Exactly zero where nothing is emitted.
     pub(crate) fn energy(&self, light: Light<'_>) -> f64 {
+        if let Light::Instance(placed) = light {
+            let [flux, portal] = placed.energies();
+            return flux + self.mean * portal;
+        }
         self.energy_of_area(light, light.area())
     }
 
@@ -52,9 +57,24 @@ impl<'a> Energies<'a> {
 
     /// Returns the bounds of a light, with its energy relative to that of all.
     pub(crate) fn bounds(&self, light: Light<'_>, total: f64) -> (LightBounds, Moments) {
-        light.bounds(light.is_portal() && self.directional, |area| {
-            let energy = self.energy_of_area(light, area);
-            if energy > 0.0 { (energy / total).max(LEAST_ENERGY) as f32 } else { 0.0 }
-        })
+        let share = |energy: f64| if energy > 0.0 { (energy / total).max(LEAST_ENERGY) as f32 } else { 0.0 };
+        if let Light::Instance(placed) = light {
+            let [flux, portal] = placed.energies();
+            let portal = self.mean * portal;
+            return placed.bounds_with(if self.directional {
+                [share(flux), share(portal)]
+            } else {
+                [share(flux + portal), 0.0]
+            });
+        }
+        light.bounds(light.is_portal() && self.directional, |area| share(self.energy_of_area(light, area)))
+    }
+
+    /// Whether a light may emit, whatever an instance is multiplied by.
+    pub(crate) fn may_emit(&self, light: Light<'_>) -> bool {
+        match light {
+            Light::Instance(placed) => emits(&placed.object, self.mean),
+            Light::Triangle(_) | Light::Lamp(_) => self.energy(light) > 0.0,
+        }
     }
 }

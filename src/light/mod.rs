@@ -12,7 +12,9 @@ mod emitted;
 mod energy;
 mod extras;
 mod illumination;
+mod instance;
 mod lamp;
+mod leaf;
 mod linear_density;
 mod mesh;
 mod meshes;
@@ -41,10 +43,13 @@ pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub(crate) use extras::Extras;
 pub use illumination::Illumination;
+pub use instance::Instance;
+pub(crate) use instance::{ObjectWalk, PlacedObject, PlacedTriangle};
 pub(crate) use lamp::LampView;
 use lamp::irradiance_of_cap;
 pub use lamp::{DiskLight, DistantLight, Lamp, PointLight, ProfileLight, SphereLight, SpotLight, TubeLight};
 use lamp::{LampLight, LampRecord};
+pub(crate) use leaf::LightLeaf;
 pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
 pub use profile::Profile;
@@ -87,6 +92,8 @@ buffers! {
         scales: f32 = b"SCAL" version 1,
         /// Light groups, profiles and distant lights: see [`Extras`].
         extras: u32 = b"XTRA" version 1,
+        /// Instances and the objects that they place, as words (see [`instance`]). Empty without instances.
+        instances: u32 = b"INST" version 1,
     }
 }
 
@@ -97,6 +104,8 @@ pub(crate) enum Light<'a> {
     Triangle(&'a LightTriangle),
     /// Anything else.
     Lamp(LampLight<'a>),
+    /// An object in its place.
+    Instance(PlacedObject<'a>),
 }
 
 /// A light of any kind as seen from a shading point.
@@ -145,7 +154,7 @@ impl LocalPoint {
 /// A point on a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightPoint {
-    pub(crate) leaf: u32,
+    pub(crate) leaf: LightLeaf,
     pub(crate) point: LocalPoint,
 }
 
@@ -217,6 +226,13 @@ pub(crate) trait LightViewKind {
 
 /// Calls the same method of whichever kind a light is.
 macro_rules! dispatch {
+    (Light, $light:expr, $kind:ident => $call:expr) => {
+        match $light {
+            Light::Triangle($kind) => $call,
+            Light::Lamp($kind) => $call,
+            Light::Instance($kind) => $call,
+        }
+    };
     ($enum:ident, $light:expr, $kind:ident => $call:expr) => {
         match $light {
             $enum::Triangle($kind) => $call,
@@ -315,9 +331,11 @@ impl LightView<'_> {
 impl<'a> Light<'a> {
     /// Returns the light of a record.
     #[inline(always)]
-    fn of(record: &'a LightTriangle, extras: Extras<'a>) -> Self {
+    fn of(record: &'a LightTriangle, extras: Extras<'a>, instances: &'a [u32]) -> Self {
         if record.index_and_flags & LightTriangle::LAMP == 0 {
             Light::Triangle(record)
+        } else if let Some(instance) = record.instance() {
+            Light::Instance(PlacedObject::at(instances, instance))
         } else {
             Light::Lamp(LampLight { record: bytemuck::cast_ref(record), extras })
         }
@@ -328,21 +346,25 @@ impl<'a> Light<'a> {
     fn triangle(self) -> Option<&'a LightTriangle> {
         match self {
             Self::Triangle(triangle) => Some(triangle),
-            Self::Lamp(_) => None,
+            Self::Lamp(_) | Self::Instance(_) => None,
         }
     }
 
     /// Returns what the weight of the light is multiplied by, by the factors of the meshes.
     #[inline]
     fn scale(self, factors: &[f32], meshes: &[u32]) -> f32 {
-        self.triangle().map_or(1.0, |triangle| scale_of(factors, meshes, triangle.index()))
+        match self {
+            Self::Triangle(triangle) => scale_of(factors, meshes, triangle.index()),
+            Self::Lamp(_) => 1.0,
+            Self::Instance(placed) => placed.weight(),
+        }
     }
 }
 
 impl LightPoint {
     /// Returns the point of a triangle with barycentrics that may have been rounded.
     #[inline]
-    pub(crate) fn new(leaf: u32, barycentrics: [f32; 2]) -> Self {
+    pub(crate) fn new(leaf: LightLeaf, barycentrics: [f32; 2]) -> Self {
         Self { leaf, point: LocalPoint::on_triangle(Lattice::from_barycentrics(barycentrics)) }
     }
 }
@@ -361,7 +383,7 @@ impl<'a> LightsView<'a> {
     /// Returns the light in a leaf.
     #[inline(always)]
     pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
-        Light::of(&self.records[leaf as usize], self.extras())
+        Light::of(&self.records[leaf as usize], self.extras(), self.instances)
     }
 
     /// Returns what few scenes have.
@@ -387,19 +409,36 @@ impl<'a> LightsView<'a> {
     #[inline(always)]
     pub(crate) fn view<'v>(
         &self,
-        leaf: u32,
+        leaf: LightLeaf,
         x: &ShadingPoint,
         environment: Option<&'v EnvironmentView<'v>>,
     ) -> Option<LightView<'v>>
     where
         'a: 'v,
     {
-        match self.light(leaf) {
+        match self.light(leaf.top) {
             Light::Triangle(light) => {
                 TriangleView::wrapped(light, x, self.illumination, self.cells, environment, LightView::Triangle)
             }
             Light::Lamp(lamp) => LampView::new(&lamp, x).map(LightView::Lamp),
+            Light::Instance(placed) => self.view_within(&placed, leaf, x, environment),
         }
+    }
+
+    /// Returns a triangle of an instance as seen from a shading point.
+    #[inline(never)]
+    fn view_within<'v>(
+        &self,
+        placed: &PlacedObject<'a>,
+        leaf: LightLeaf,
+        x: &ShadingPoint,
+        environment: Option<&'v EnvironmentView<'v>>,
+    ) -> Option<LightView<'v>>
+    where
+        'a: 'v,
+    {
+        let triangle = placed.triangle(leaf.below()?);
+        TriangleView::placed(&triangle, x, self.illumination, self.cells, environment, LightView::Triangle)
     }
 
     /// Returns the leaf of a triangle; `None` for one that emits nothing or that was never added.
@@ -417,24 +456,32 @@ impl<'a> LightsView<'a> {
         self.leaf_of.get(index as usize).copied().filter(|leaf| *leaf < NO_AREA)
     }
 
+    /// Returns the leaf of the triangle of a hit; `None` for one that emits nothing or that was never added.
+    pub(crate) fn leaf_of_hit(&self, hit: &Hit) -> Option<LightLeaf> {
+        match hit.instance {
+            None => self.leaf(hit.triangle).map(LightLeaf::alone),
+            Some(instance) => self.leaf_within(instance, hit.triangle),
+        }
+    }
+
     /// Returns the leaf of what was sampled; `None` for the environment.
-    pub(crate) fn leaf_of_sampled(&self, light: &SampledLight) -> Option<u32> {
+    pub(crate) fn leaf_of_sampled(&self, light: &SampledLight) -> Option<LightLeaf> {
         match light {
-            SampledLight::Triangle(hit) => self.leaf(hit.triangle),
-            SampledLight::Shape(id) | SampledLight::Punctual(id) => self.leaf_of_lamp(*id),
+            SampledLight::Triangle(hit) => self.leaf_of_hit(hit),
+            SampledLight::Shape(id) | SampledLight::Punctual(id) => self.leaf_of_lamp(*id).map(LightLeaf::alone),
             SampledLight::Environment => None,
         }
     }
 
     /// Returns what a host gets to know of a point of a light.
+    #[inline]
     pub(crate) fn sampled(&self, LightPoint { leaf, point }: LightPoint) -> SampledLight {
-        match self.light(leaf) {
-            Light::Triangle(triangle) => SampledLight::Triangle(Hit {
-                triangle: self.id(triangle),
-                barycentrics: point.lattice().to_barycentrics(),
-            }),
-            Light::Lamp(lamp) => lamp.record.sampled(),
-        }
+        let (triangle, instance) = match self.light(leaf.top) {
+            Light::Triangle(triangle) => (self.id(triangle), None),
+            Light::Lamp(lamp) => return lamp.record.sampled(),
+            Light::Instance(placed) => self.id_within(leaf, &placed),
+        };
+        SampledLight::Triangle(Hit { triangle, barycentrics: point.lattice().to_barycentrics(), instance })
     }
 
     /// Returns the point of a lamp in a direction; `None` for a lamp without an extent, or one that emits nothing or was never
@@ -442,7 +489,9 @@ impl<'a> LightsView<'a> {
     pub(crate) fn point_of_lamp(&self, id: LightId, direction: Vec3) -> Option<LightPoint> {
         let leaf = self.leaf_of_lamp(id)?;
         let Light::Lamp(lamp) = self.light(leaf) else { return None };
-        lamp.record.has_extent().then(|| LightPoint { leaf, point: LocalPoint::from_direction(direction) })
+        lamp.record
+            .has_extent()
+            .then(|| LightPoint { leaf: LightLeaf::alone(leaf), point: LocalPoint::from_direction(direction) })
     }
 
     fn id(&self, triangle: &LightTriangle) -> TriangleId {
@@ -453,7 +502,7 @@ impl<'a> LightsView<'a> {
 
     /// Returns what the weight of a light is multiplied by.
     #[inline]
-    pub(crate) fn scale(&self, leaf: u32) -> f32 {
-        self.light(leaf).scale(self.scales, self.meshes)
+    pub(crate) fn scale(&self, leaf: LightLeaf) -> f32 {
+        self.light(leaf.top).scale(self.scales, self.meshes)
     }
 }

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::cell_kernel::CellDescent;
 use super::linear_density::LinearDensity;
 use super::spherical_grid::{GridCell, SphericalGrid};
-use super::{DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind, LocalPoint};
+use super::{DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind, LocalPoint, PlacedTriangle};
 use crate::blas::{CellNode, Draw, Follow, Guide, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{DirectionCone, EnvironmentView};
 use crate::geometry;
@@ -49,7 +49,7 @@ pub(crate) struct TriangleView<'a> {
     pub(super) vertices: [Vec3; 3],
     /// Vertices relative to the shading point, in double precision.
     pub(super) exact_vertices: [DVec3; 3],
-    /// Determinant of the vertices, by exact differences: negative in front.
+    /// Determinant of the vertices, by exact differences: negative in front, but for mirror images.
     pub(super) determinant: f64,
     /// Unit normal of the front side.
     normal: Vec3,
@@ -87,11 +87,45 @@ impl<'a> TriangleView<'a> {
         environment: Option<&'a EnvironmentView<'a>>,
         wrap: impl FnOnce(Self) -> V,
     ) -> Option<V> {
+        let triangle = light.triangle();
+        let relative = (triangle.exactly_relative_to(x.position), triangle.relative_to(x.position));
+        Self::of_vertices(light, relative, triangle.double_area_vector(), x, illumination, cells, environment, wrap)
+    }
+
+    /// Returns the view of a triangle of an instance.
+    pub(super) fn placed<V>(
+        triangle: &PlacedTriangle<'_>,
+        x: &ShadingPoint,
+        illumination: Illumination,
+        cells: &'a [CellNode],
+        environment: Option<&'a EnvironmentView<'a>>,
+        wrap: impl FnOnce(Self) -> V,
+    ) -> Option<V> {
+        let exact = triangle.exactly_relative_to(x.position);
+        let relative = (exact, exact.map(|vertex| vertex.as_vec3()));
+        let front = triangle.double_area_vector();
+        // The order of the vertices is the object's own, whichever way it runs around the front.
+        let turn = if triangle.is_mirrored() { -1.0 } else { 1.0 };
+        let wrap = |view: Self| wrap(Self { determinant: turn * view.determinant, ..view });
+        Self::of_vertices(triangle.record, relative, front, x, illumination, cells, environment, wrap)
+    }
+
+    /// Returns the view of a triangle by its vertices relative to the shading point and the normal of its front times twice
+    /// its area.
+    #[expect(clippy::too_many_arguments, reason = "a struct would be copied")]
+    #[inline(always)]
+    fn of_vertices<V>(
+        light: &LightTriangle,
+        (exact_vertices, vertices): ([DVec3; 3], [Vec3; 3]),
+        cross: DVec3,
+        x: &ShadingPoint,
+        illumination: Illumination,
+        cells: &'a [CellNode],
+        environment: Option<&'a EnvironmentView<'a>>,
+        wrap: impl FnOnce(Self) -> V,
+    ) -> Option<V> {
         // NaN fails.
         let is_near = x.position.to_array().iter().all(|x| x.abs() <= FARTHEST_POINT);
-        let triangle = light.triangle();
-        let (exact_vertices, vertices) = (triangle.exactly_relative_to(x.position), triangle.relative_to(x.position));
-        let cross = triangle.double_area_vector();
         let side = cross.dot(exact_vertices[0]);
         if !(is_near && light.emits_to(side) && !x.receiver.is_dark(&vertices)) {
             return None;

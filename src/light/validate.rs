@@ -10,16 +10,24 @@ impl LightsView<'_> {
     /// Checks that no lookup can leave a buffer, go around in circles or meet a number that is not finite.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         blas::validate(self.cells)?;
-        let triangle = |record| Light::of(record, Extras::NONE).triangle();
+        // Before any record is taken for that of an instance.
+        self.validate_instances()?;
+        let is_instance = |&(leaf, number): &(u32, u32)| self.is_instance_at(number, leaf);
+        let instances = || (0..).zip(self.records).filter_map(|(leaf, record)| Some((leaf, record.instance()?)));
+        if let Some((leaf, number)) = instances().find(|instance| !is_instance(instance)) {
+            return Err(Error::bytes("instance of a leaf", leaf as usize, number, self.instances.len()));
+        }
+        let triangle = |record| Light::of(record, Extras::NONE, self.instances).triangle();
         let roots: Vec<blas::Root> = self.records.iter().filter_map(triangle).map(|triangle| triangle.root).collect();
-        Error::unless_equal("mark of lamps", self.has_lamps.into(), (roots.len() < self.records.len()).into())?;
+        let lamps = self.records.len() - roots.len() - instances().count();
+        Error::unless_equal("mark of lamps", self.has_lamps.into(), (lamps > 0).into())?;
         blas::validate_roots(&roots, self.cells)?;
         self.validate_leaves()?;
         self.extras().validate(self.len())?;
         let count = self.extras().profiles().count();
-        let lamps = self.records.iter().filter_map(|record| match Light::of(record, Extras::NONE) {
+        let lamps = self.records.iter().filter_map(|record| match Light::of(record, Extras::NONE, self.instances) {
             Light::Lamp(lamp) => lamp.record.profile(),
-            Light::Triangle(_) => None,
+            Light::Triangle(_) | Light::Instance(_) => None,
         });
         for profile in lamps {
             if profile as usize >= count {
@@ -52,8 +60,10 @@ impl LightsView<'_> {
                 Some(triangle.index()).filter(|&index| triangle.is_valid() && index < lamp_start)
             }
             Light::Lamp(lamp) => lamp_start.checked_add(lamp.record.number()).filter(|_| lamp.record.is_valid()),
+            Light::Instance(_) => None,
         };
-        for leaf in 0..self.len() as u32 {
+        let is_single = |&leaf: &u32| self.instance(leaf).is_none();
+        for leaf in (0..self.len() as u32).filter(is_single) {
             if index(leaf).and_then(|index| self.leaf_of.get(index as usize)) != Some(&leaf) {
                 return Err(Error::bytes("triangle or lamp", leaf as usize, 0, self.leaf_of.len()));
             }

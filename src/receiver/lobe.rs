@@ -48,6 +48,13 @@ pub(crate) trait Lobe: Copy {
         self.variation(direction, spread2) <= CONSTANT_VARIATION
     }
 
+    /// How much the bounds of clusters shrink along each axis: negative where rounding may have moved the shading point, which
+    /// widens them. Zero for a point that was passed in.
+    #[inline(always)]
+    fn inset(&self) -> f32 {
+        0.0
+    }
+
     /// Returns the lobe in another frame.
     fn map(self, map: impl Fn([f32; 3]) -> [f32; 3]) -> Self;
 }

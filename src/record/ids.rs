@@ -74,7 +74,48 @@ impl ProfileId {
     }
 }
 
+/// An object that was added to a builder: meshes that are placed by instances. Objects are numbered from 0 in the order in
+/// which they are added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ObjectId(pub(crate) u32);
+
+impl ObjectId {
+    /// Returns the id of the object with this number.
+    #[must_use]
+    pub const fn from_index(index: u32) -> Self {
+        Self(index)
+    }
+
+    /// Returns the number of the object.
+    #[must_use]
+    pub const fn index(self) -> u32 {
+        self.0
+    }
+}
+
+/// An object at one place. Instances are numbered from 0 in the order in which they are added, those of all objects together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct InstanceId(pub(crate) u32);
+
+impl InstanceId {
+    /// Returns the id of the instance with this number.
+    #[must_use]
+    pub const fn from_index(index: u32) -> Self {
+        Self(index)
+    }
+
+    /// Returns the number of the instance.
+    #[must_use]
+    pub const fn index(self) -> u32 {
+        self.0
+    }
+}
+
 /// One triangle of one mesh.
+///
+/// A triangle of an [`Instance`](crate::Instance) is numbered within its object: the mesh is one of those that
+/// [`add_object`](crate::LightSamplerBuilder::add_object) was given, numbered from 0. Which instance it belongs to is said
+/// beside it ([`Hit::instance`](crate::Hit::instance)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub struct TriangleId {

@@ -4,6 +4,6 @@ mod ids;
 mod image;
 mod sample;
 
-pub use ids::{LightId, MeshId, ProfileId, TextureId, TriangleId};
+pub use ids::{InstanceId, LightId, MeshId, ObjectId, ProfileId, TextureId, TriangleId};
 pub use image::{Filter, Wrap};
 pub use sample::{Hit, LightSample, SampledLight};

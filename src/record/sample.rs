@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::ids::{LightId, TriangleId};
+use super::ids::{InstanceId, LightId, TriangleId};
 
 /// A point on a light triangle, as a host's own intersector reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,13 +12,22 @@ pub struct Hit {
     pub triangle: TriangleId,
     /// Weights `b1`, `b2` of the second and third vertex; `b0 = 1 - b1 - b2` is the first one's.
     pub barycentrics: [f32; 2],
+    /// The instance that the triangle belongs to, if it is a triangle of an object.
+    pub instance: Option<InstanceId>,
 }
 
 impl Hit {
     /// Returns the point of a triangle with these weights `[b1, b2]` of its second and third vertex.
     #[must_use]
     pub const fn new(triangle: TriangleId, barycentrics: [f32; 2]) -> Self {
-        Self { triangle, barycentrics }
+        Self { triangle, barycentrics, instance: None }
+    }
+
+    /// Returns the point of a triangle of an instance. The triangle is numbered within its object, and the weights
+    /// `[b1, b2]` are those of the second and third vertex in the object's own order, in a mirror image as well.
+    #[must_use]
+    pub const fn on_instance(instance: InstanceId, triangle: TriangleId, barycentrics: [f32; 2]) -> Self {
+        Self { triangle, barycentrics, instance: Some(instance) }
     }
 }
 

@@ -7,11 +7,11 @@ use super::lights::LightSampler;
 use crate::blas::{Procedural, Texture};
 use crate::env::{Environment, RegionMoments};
 use crate::error::Error;
-use crate::light::{Energies, Illumination, Lamp, LightCollection, Mesh, Profile};
+use crate::light::{Energies, Illumination, Instance, Lamp, LightCollection, Mesh, Profile};
 use crate::parallel;
 use crate::progress::{Progress, Report};
 use crate::receiver::ALL_GROUPS;
-use crate::record::{LightId, MeshId, ProfileId, TextureId};
+use crate::record::{InstanceId, LightId, MeshId, ObjectId, ProfileId, TextureId};
 use crate::tlas::{self, Arity};
 
 /// Share of the time that lights take after which all of them have found their place; the rest is the collapse and the
@@ -211,7 +211,70 @@ impl<'a> LightSamplerBuilder<'a> {
         self.collection.add_lamp(light.into(), groups)
     }
 
-    /// Builds the trees over textures, and the tree over all lights that can emit.
+    /// Adds an object, in one expression. Objects are numbered from 0.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::add_object`].
+    pub fn object(mut self, meshes: &[Mesh<'_>]) -> Result<Self, Error> {
+        self.add_object(meshes)?;
+        Ok(self)
+    }
+
+    /// Adds an instance, in one expression. Instances are numbered from 0.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::add_instance`].
+    pub fn instance(mut self, instance: Instance) -> Result<Self, Error> {
+        self.add_instance(instance)?;
+        Ok(self)
+    }
+
+    /// Adds an object: meshes that send light only where an [`Instance`] places them. It is built once, with a light tree of
+    /// its own, and each instance takes about 150 bytes, however many triangles it has. Within the object its meshes are
+    /// numbered from 0, in the order in which they are given. After an error the builder is as it was before.
+    ///
+    /// # Errors
+    ///
+    /// If there is no triangle, or [`Self::add_mesh`] would refuse one of the meshes.
+    pub fn add_object(&mut self, meshes: &[Mesh<'_>]) -> Result<ObjectId, Error> {
+        self.collection.add_object(meshes)
+    }
+
+    /// Adds an instance of an object that has been added. After an error the builder is as it was before.
+    ///
+    /// ```
+    /// use fanlight::glam::{Affine3A, Vec3};
+    /// use fanlight::{Hit, Instance, LightSampler, Mesh, ShadingPoint};
+    ///
+    /// let positions = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]].map(Vec3::from);
+    /// let mut builder = LightSampler::builder();
+    /// let lamp = builder.add_object(&[Mesh::emitter(&positions, &[[0, 1, 2]])])?;
+    /// for i in 0..100 {
+    ///     let place = Affine3A::from_translation(Vec3::new(3.0 * i as f32, 0.0, 2.0));
+    ///     builder.add_instance(Instance::new(lamp, place).scaled(1.0 + i as f32))?;
+    /// }
+    /// let lights = builder.build()?;
+    /// assert_eq!(lights.light_count(), 100);
+    ///
+    /// let here = lights.at(&ShadingPoint::surface(Vec3::ZERO, Vec3::Z));
+    /// let sample = here.sample([0.3, 0.6, 0.1]).expect("lamps are above");
+    /// let hit = sample.hit().expect("all lights are triangles");
+    /// assert_eq!(here.pdf(&Hit::on_instance(hit.instance.unwrap(), hit.triangle, hit.barycentrics)), sample.pdf);
+    /// # Ok::<(), fanlight::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// If there is no such object; if an element of the transform is not finite, its longest axis is more than 1e6 times as
+    /// long as its shortest, or a length is above 1e12 or below 1e-12, so that it cannot be inverted; if it moves a corner
+    /// of the object's box to a coordinate above 1e9; or if the factor of the weights is NaN, negative or above 1e30.
+    pub fn add_instance(&mut self, instance: Instance) -> Result<InstanceId, Error> {
+        self.collection.add_instance(&instance)
+    }
+
+    /// Builds the trees over textures and objects, and the tree over all lights that can emit.
     ///
     /// # Errors
     ///
@@ -237,9 +300,11 @@ impl<'a> LightSamplerBuilder<'a> {
         let environment = self.environment.map_or_else(|| Environment::constant(1.0), Ok)?;
         let energies = Energies::new(&environment, &[], &[]);
         let mut collection = self.collection;
-        let work = collection.image_work() + collection.light_count() as f64 / PLACED;
+        let lights = collection.light_count() + collection.object_light_count();
+        let work = collection.image_work() + lights as f64 / PLACED;
         let progress = Progress::new(report, work);
         collection.build_images(&progress)?;
+        collection.build_objects(self.arity, &energies, &progress)?;
         let emitting = collection.emitting(&energies)?;
         let total = collection.total_energy(&energies);
         let bounds = |i: u32| energies.bounds(collection.light(emitting[i as usize]), total).0;

@@ -11,7 +11,7 @@ use super::distant_rays::DistantRays;
 use super::finite::{to_finite, to_positive};
 use super::lights::LightSamplerView;
 use crate::env::DirectionDistribution;
-use crate::light::{EmissionStart, EmittedRay, Light, LightKind, LightPoint, LocalPoint};
+use crate::light::{EmissionStart, EmittedRay, LightKind, LightLeaf, LightPoint, LocalPoint, PlacedObject};
 use crate::math;
 use crate::record::{Hit, LightId, SampledLight};
 use crate::technique::LightScene;
@@ -171,7 +171,7 @@ impl<'a> Emission<'a> {
     /// in which light travels: per solid angle, and per area perpendicular to the direction. Zero where it cannot.
     #[must_use]
     pub fn pdf(&self, hit: &Hit, direction: Vec3) -> f32 {
-        let density = self.scene.lights.leaf(hit.triangle).map_or(0.0, |leaf| {
+        let density = self.scene.lights.leaf_of_hit(hit).map_or(0.0, |leaf| {
             let directions = self.directions.pdf(&self.scene.environment, -direction);
             self.density(LightPoint::new(leaf, hit.barycentrics), direction, directions)
         });
@@ -188,7 +188,7 @@ impl<'a> Emission<'a> {
             let light = &self.scene.lights.extras().distants()[place];
             return if light.sends(direction) { to_finite(share * rays.pdf(light)) } else { 0.0 };
         }
-        let leaf = self.scene.lights.leaf_of_lamp(light);
+        let leaf = self.scene.lights.leaf_of_lamp(light).map(LightLeaf::alone);
         let density = |leaf| self.density(LightPoint { leaf, point: LocalPoint::NONE }, direction, 0.0);
         to_finite(leaf.map_or(0.0, density))
     }
@@ -225,7 +225,7 @@ impl<'a> Emission<'a> {
     }
 
     /// Sum of the densities of all points along a line, except those of one light.
-    fn ray_density(&self, position: Vec3, towards: Vec3, except: Option<u32>) -> f64 {
+    fn ray_density(&self, position: Vec3, towards: Vec3, except: Option<LightLeaf>) -> f64 {
         let directions = self.directions.pdf(&self.scene.environment, towards);
         let mut density = 0.0;
         self.scene.cross(
@@ -241,12 +241,12 @@ impl<'a> Emission<'a> {
     /// draws a point of a portal. Zero where it cannot.
     #[must_use]
     pub fn pdf_distant(&self, direction: Vec3, hit: &Hit) -> f32 {
-        let leaf = self.scene.lights.leaf(hit.triangle);
+        let leaf = self.scene.lights.leaf_of_hit(hit);
         to_finite(leaf.map_or(0.0, |leaf| self.beam_density(LightPoint::new(leaf, hit.barycentrics), direction)))
     }
 
     fn density(&self, point: LightPoint, direction: Vec3, directions: f64) -> f64 {
-        if is_directional(&self.scene, self.scene.lights.light(point.leaf)) {
+        if is_directional(&self.scene, point.leaf) {
             self.shares[1] * directions * self.beam_density(point, direction)
         } else {
             self.diffuse_density(point, direction)
@@ -254,7 +254,7 @@ impl<'a> Emission<'a> {
     }
 
     fn sample_diffuse(&self, mut u: Variate, point: [Variate; 2], direction: [Variate; 2]) -> Option<EmissionSample> {
-        let (leaf, pmf) = self.scene.tlas.sample_outgoing(&Outgoing::Diffuse, &mut u)?;
+        let (leaf, pmf) = self.scene.sample_outgoing(&Outgoing::Diffuse, &mut u)?;
         let EmittedRay { point, position, normal, direction, pdf } =
             self.scene.lights.emit(leaf, point, direction, u.value())?;
         (pdf > 0.0).then(|| EmissionSample {
@@ -270,7 +270,7 @@ impl<'a> Emission<'a> {
     fn diffuse_density(&self, point: LightPoint, direction: Vec3) -> f64 {
         match self.scene.lights.emission_pdf(point, direction) {
             0.0 => 0.0,
-            pdf => self.shares[0] * self.scene.tlas.pmf_outgoing(point.leaf, &Outgoing::Diffuse) * pdf,
+            pdf => self.shares[0] * self.scene.pmf_outgoing(point.leaf, &Outgoing::Diffuse) * pdf,
         }
     }
 
@@ -282,7 +282,7 @@ impl<'a> Emission<'a> {
         point: [Variate; 2],
     ) -> Option<EmissionSample> {
         let beam = beam(&self.scene, direction, [0.0, 1.0]);
-        let (leaf, pmf) = self.scene.tlas.sample_outgoing(&beam, &mut u)?;
+        let (leaf, pmf) = self.scene.sample_outgoing(&beam, &mut u)?;
         let start = self.scene.lights.sample_start(leaf, point)?;
         let cosine = self.beam_cosine(leaf, &start, direction)?;
         let point = LightPoint { leaf, point: LocalPoint::on_triangle(start.point) };
@@ -300,12 +300,12 @@ impl<'a> Emission<'a> {
         let Some(start) = self.scene.lights.start_at(leaf, point) else { return 0.0 };
         let Some(cosine) = self.beam_cosine(leaf, &start, direction) else { return 0.0 };
         let beam = beam(&self.scene, direction, [0.0, 1.0]);
-        self.scene.tlas.pmf_outgoing(leaf, &beam) * start.pdf_area / cosine
+        self.scene.pmf_outgoing(leaf, &beam) * start.pdf_area / cosine
     }
 
     /// Area perpendicular to a beam per area of a portal; `None` for what the beam does not pass.
-    fn beam_cosine(&self, leaf: u32, start: &EmissionStart, direction: Vec3) -> Option<f64> {
-        if !self.scene.lights.light(leaf).is_portal() {
+    fn beam_cosine(&self, leaf: LightLeaf, start: &EmissionStart, direction: Vec3) -> Option<f64> {
+        if !self.scene.lights.is_portal(leaf) {
             return None;
         }
         let cosine = start.normal.as_dvec3().dot(direction.as_dvec3());
@@ -327,10 +327,13 @@ fn outgoing_of_all(scene: &LightScene<'_>, outgoing: &Outgoing) -> f32 {
 
 /// What the only light sends out, in units of its energy.
 fn outgoing_of_one(scene: &LightScene<'_>, outgoing: &Outgoing) -> f32 {
-    let light = scene.lights.light(0);
+    if let Some(placed) = scene.lights.instance(0) {
+        return outgoing_of_instance(scene, &placed, outgoing);
+    }
+    let (light, is_directional) = (scene.lights.light(0), is_directional(scene, LightLeaf::alone(0)));
     match outgoing {
-        Outgoing::Diffuse => f32::from(u8::from(!is_directional(scene, light))),
-        Outgoing::Beam(beam) if is_directional(scene, light) || !beam.portals_apart => {
+        Outgoing::Diffuse => f32::from(u8::from(!is_directional)),
+        Outgoing::Beam(beam) if is_directional || !beam.portals_apart => {
             let (bounds, moments) = light.bounds(false, |_| 1.0);
             beam.projection(bounds.normals.axis, [0.0, 1.0], moments.normal, bounds.two_sided)
         }
@@ -338,9 +341,30 @@ fn outgoing_of_one(scene: &LightScene<'_>, outgoing: &Outgoing) -> f32 {
     }
 }
 
+/// What the only instance sends out, in units of its energy.
+fn outgoing_of_instance(scene: &LightScene<'_>, placed: &PlacedObject<'_>, outgoing: &Outgoing) -> f32 {
+    let [flux, portal] = placed.shares(scene.environment.mean_without_features());
+    let is_image = !scene.environment.is_constant();
+    match outgoing {
+        Outgoing::Diffuse => {
+            if is_image {
+                flux
+            } else {
+                flux + portal
+            }
+        }
+        Outgoing::Beam(beam) => {
+            let (bounds, moments) = placed.bounds(false, |_| 1.0);
+            let (sin, cos) = math::sin_cos(bounds.normals.theta);
+            let projection = beam.projection(bounds.normals.axis, [sin, cos], moments.normal, bounds.two_sided);
+            projection * if beam.portals_apart { portal } else { flux + portal }
+        }
+    }
+}
+
 /// Whether what a light sends depends on the direction it is seen from.
-fn is_directional(scene: &LightScene<'_>, light: Light<'_>) -> bool {
-    light.is_portal() && !scene.environment.is_constant()
+fn is_directional(scene: &LightScene<'_>, leaf: LightLeaf) -> bool {
+    scene.lights.is_portal(leaf) && !scene.environment.is_constant()
 }
 
 /// One variate for each number of a sample.

@@ -45,7 +45,7 @@ pub struct LightSamplerView<'a> {
 pub struct ByteSizes {
     /// Tree over the lights.
     pub light_tree: usize,
-    /// The lights themselves, and the ways from ids to lights.
+    /// The lights themselves, and the ways from ids to lights; objects, with their own light trees, and instances.
     pub lights: usize,
     /// Trees over textures.
     pub texture_trees: usize,
@@ -118,7 +118,8 @@ impl LightSampler {
         self.environment.set_rotation(rotation)
     }
 
-    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them.
+    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them. A triangle of an
+    /// object counts once for each of the object's instances.
     #[must_use]
     pub fn light_count(&self) -> usize {
         self.as_view().light_count()
@@ -150,10 +151,11 @@ impl<'a> LightSamplerView<'a> {
         self.scene.environment
     }
 
-    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them.
+    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them. A triangle of an
+    /// object counts once for each of the object's instances.
     #[must_use]
     pub fn light_count(&self) -> usize {
-        self.scene.lights.len() + self.scene.lights.extras().distants().len()
+        self.scene.lights.count() + self.scene.lights.extras().distants().len()
     }
 
     /// Returns the number of bytes that the structures take.

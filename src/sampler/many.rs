@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 use super::lights::LightSamplerView;
 #[cfg(doc)]
 use super::point::PointSampler;
+use crate::light::LightLeaf;
 use crate::receiver::{NoLobe, ShadingPoint};
 use crate::record::LightSample;
 use crate::technique::{Variates, Viewpoint};
@@ -19,8 +20,9 @@ impl LightSamplerView<'_> {
     pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
         for (queries, samples) in queries.chunks(INTERLEAVED).zip(samples.chunks_mut(INTERLEAVED)) {
             // With bright features a sample is mostly the search for them, and with the environment as a light walks are
-            // few. Lobes are of different kinds, and a step goes down for one kind at a time.
-            let is_apart = self.scene.has_more_than_trees();
+            // few. Lobes are of different kinds, and a step goes down for one kind at a time. Instances have walks of their
+            // own.
+            let is_apart = self.scene.has_more_than_trees() || self.scene.lights.has_instances();
             if is_apart || queries.iter().any(|(x, _)| x.receiver.has_lobe()) {
                 let each = queries.iter().zip(samples);
                 each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));
@@ -51,7 +53,7 @@ impl LightSamplerView<'_> {
         let mut at = self.at(first);
         for (i, sample) in samples.iter_mut().enumerate().take(walks.len()) {
             at.move_to(&queries[i].0, self.region(&queries[i].0));
-            *sample = walks[i].leaf().and_then(|chosen| at.sample_on(chosen, points[i]));
+            *sample = walks[i].leaf().and_then(|(leaf, pmf)| at.sample_on((LightLeaf::alone(leaf), pmf), points[i]));
         }
     }
 }

@@ -5,9 +5,9 @@ use core::cell::{Ref, RefCell};
 use glam::Vec3;
 
 use super::finite::{to_finite, to_positive};
-use crate::light::{LightPoint, LightView, LightViewKind};
+use crate::light::{LightLeaf, LightPoint, LightView, LightViewKind};
 use crate::receiver::ShadingPoint;
-use crate::record::{Hit, LightId, LightSample, SampledLight, TriangleId};
+use crate::record::{Hit, InstanceId, LightId, LightSample, SampledLight, TriangleId};
 use crate::technique::{DistantDirection, Drawn, Mixed, Mixture, SkyDirection, Variates, Viewpoint};
 use crate::tlas::Splitting;
 use crate::visibility::RegionFactors;
@@ -112,7 +112,7 @@ impl<'a> PointSampler<'a> {
 
     /// Draws a point on a light that the tree has chosen.
     #[inline(always)]
-    pub(super) fn sample_on(&self, chosen: (u32, f64), u: [Variate; 2]) -> Option<LightSample> {
+    pub(super) fn sample_on(&self, chosen: (LightLeaf, f64), u: [Variate; 2]) -> Option<LightSample> {
         self.mixture().one().sample_on(&self.at, chosen, u, |drawn, view| light_sample(&self.at, drawn, view))
     }
 
@@ -162,6 +162,13 @@ impl<'a> PointSampler<'a> {
     #[must_use]
     pub fn pmf(&self, triangle: TriangleId) -> f32 {
         let leaf = self.at.scene.lights.leaf(triangle).filter(|leaf| self.at.receives(*leaf));
+        leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, LightLeaf::alone(leaf)) as f32)
+    }
+
+    /// Returns [`Self::pmf`] of a triangle of an instance, which is numbered within its object.
+    #[must_use]
+    pub fn pmf_within(&self, instance: InstanceId, triangle: TriangleId) -> f32 {
+        let leaf = self.at.scene.lights.leaf_within(instance, triangle).filter(|leaf| self.at.receives(leaf.top));
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
     }
 
@@ -172,7 +179,7 @@ impl<'a> PointSampler<'a> {
             return self.mixture().one().distant_pmf(&self.at, light) as f32;
         }
         let leaf = self.at.scene.lights.leaf_of_lamp(light).filter(|leaf| self.at.receives(*leaf));
-        leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
+        leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, LightLeaf::alone(leaf)) as f32)
     }
 
     /// Estimates the irradiance at the shading point from all lights together, as if nothing were in between: radiance times
@@ -246,9 +253,13 @@ impl<'a> PointSampler<'a> {
             |draw| variate(draw, 0),
             |leaf, count| {
                 let point = [variate(visits, 1), variate(visits, 2)];
-                samples.extend(
-                    mixed.sample_on(&self.at, (leaf, count), point, |drawn, view| light_sample(&self.at, drawn, view)),
-                );
+                // Which triangle of an instance: by a key that no draw has.
+                let key = 4 * u64::from(visits) + 3;
+                let within = || Variate::scrambled(u[0], key, salt ^ key);
+                let chosen = self.at.choose_within(leaf, count, within);
+                samples.extend(chosen.and_then(|chosen| {
+                    mixed.sample_on(&self.at, chosen, point, |drawn, view| light_sample(&self.at, drawn, view))
+                }));
                 visits += 1;
             },
         );
@@ -295,7 +306,7 @@ impl<'a> PointSampler<'a> {
     }
 
     fn pdf_of_hit(&self, hit: &Hit, mixed: &Mixed<'_>) -> f32 {
-        let Some(leaf) = self.at.scene.lights.leaf(hit.triangle) else { return 0.0 };
+        let Some(leaf) = self.at.scene.lights.leaf_of_hit(hit) else { return 0.0 };
         let view = &self.at.view(leaf);
         let Some(view) = view else { return 0.0 };
         to_finite(mixed.density(&self.at, LightPoint::new(leaf, hit.barycentrics), view))
@@ -337,7 +348,7 @@ impl<'a> PointSampler<'a> {
     }
 
     /// Sum of the densities of all points along a ray, except those of one light.
-    fn direction_density(&self, direction: Vec3, except: Option<u32>, mixed: &Mixed<'_>) -> f64 {
+    fn direction_density(&self, direction: Vec3, except: Option<LightLeaf>, mixed: &Mixed<'_>) -> f64 {
         let mut density = 0.0;
         self.at.scene.cross(
             self.at.x.position,

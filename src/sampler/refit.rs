@@ -2,8 +2,8 @@
 
 use super::lights::LightSampler;
 use crate::error::Error;
-use crate::light::{Energies, Lamp, MeshUpdate, storable};
-use crate::record::LightId;
+use crate::light::{Energies, Instance, Lamp, MeshUpdate, storable};
+use crate::record::{InstanceId, LightId};
 
 impl LightSampler {
     /// Applies changes of meshes without a rebuild.
@@ -43,6 +43,24 @@ impl LightSampler {
     /// not.
     pub fn refit_lights(&mut self, updates: &[(LightId, Lamp)]) -> Result<(), Error> {
         self.lights.update_lamps(updates)?;
+        self.fit();
+        Ok(())
+    }
+
+    /// Replaces instances, without a rebuild and without a look at their meshes: by instances of the same objects that are at
+    /// other places or have other factors. What holds of [`Self::refit`] holds of this; the time is in proportion to the number
+    /// of instances, meshes and other lights, and not to that of the triangles in objects.
+    ///
+    /// An instance with a factor of 0 is never sampled, and comes back if it is replaced again.
+    ///
+    /// After an error the sampler is as it was before.
+    ///
+    /// # Errors
+    ///
+    /// If there is no such instance, it was one of another object, or
+    /// [`add_instance`](crate::LightSamplerBuilder::add_instance) would refuse the new one.
+    pub fn refit_instances(&mut self, updates: &[(InstanceId, Instance)]) -> Result<(), Error> {
+        self.lights.update_instances(updates)?;
         self.fit();
         Ok(())
     }

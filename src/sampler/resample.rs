@@ -17,7 +17,6 @@
 //! so that the estimate is unbiased for any M. The better the target matches the integrand, the less noise is left.
 
 use super::point::PointSampler;
-use crate::light::LightKind;
 use crate::math::{at_least, at_most};
 use crate::record::LightSample;
 use crate::warp::{Variate, seed};
@@ -124,7 +123,7 @@ impl PointSampler<'_> {
     /// Density of what a sample stands for: the point of an emitter, or the direction.
     fn density_of_contribution(&self, sample: &LightSample) -> f32 {
         let lights = &self.at.scene.lights;
-        let emits = lights.leaf_of_sampled(&sample.light).is_some_and(|leaf| !lights.light(leaf).is_portal());
+        let emits = lights.leaf_of_sampled(&sample.light).is_some_and(|leaf| !lights.is_portal(leaf));
         if emits { sample.pdf } else { self.pdf_sample_direction(sample) }
     }
 }

@@ -7,7 +7,6 @@ use super::lights::{LightSampler, LightSamplerView};
 use super::point::PointSampler;
 use crate::env::{REGION_DEPTH, region_at};
 use crate::error::{Error, ErrorKind};
-use crate::light::LightKind;
 use crate::parallel;
 use crate::progress::{Progress, Report};
 use crate::receiver::ShadingPoint;
@@ -198,19 +197,19 @@ impl VisibilityCounters {
         let mut weight = 1.0;
         let key = match (scene.lights.leaf_of_sampled(&sample.light), &sample.light) {
             (Some(leaf), _) => {
-                let is_portal = scene.lights.light(leaf).is_portal();
+                let is_portal = scene.lights.is_portal(leaf);
                 if is_portal && scene.has_features() && scene.environment.feature_at(sample.direction).is_some() {
-                    LeafKey::feature(leaf)
+                    LeafKey::feature(leaf.top)
                 } else {
                     if here.at.visibility.is_some() {
                         // As if the sample had been drawn without the table: else lanes would seem as visible as what the
                         // table has left of them.
-                        let drawn = scene.tlas.pmf(leaf, &here.at, None);
-                        let unlearned = scene.tlas.pmf(leaf, &here.at.unlearned(), None);
+                        let drawn = scene.tlas.pmf(leaf.top, &here.at, None);
+                        let unlearned = scene.tlas.pmf(leaf.top, &here.at.unlearned(), None);
                         let drawn = self.unlearned_share * unlearned + (1.0 - self.unlearned_share) * drawn;
                         weight = if drawn > 0.0 { (unlearned / drawn) as f32 } else { 1.0 };
                     }
-                    LeafKey::leaf(leaf)
+                    LeafKey::leaf(leaf.top)
                 }
             }
             (None, SampledLight::Environment) => {

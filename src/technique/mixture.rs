@@ -8,7 +8,7 @@ use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
 use glam::{DVec3, Vec3};
 
 use crate::env::RegionMoments;
-use crate::light::{LightPoint, LightView};
+use crate::light::{LightLeaf, LightPoint, LightView};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::{Variate, pick_pair};
 
@@ -291,7 +291,7 @@ impl Mixed<'_> {
     pub(crate) fn sample_on<R>(
         &self,
         at: &Viewpoint<'_>,
-        (leaf, pmf): (u32, f64),
+        (leaf, pmf): (LightLeaf, f64),
         u: [Variate; 2],
         then: impl FnOnce(&Drawn, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
@@ -321,7 +321,7 @@ impl Mixed<'_> {
     }
 
     /// Returns the probability of a light by the trees, or the expected number of visits.
-    pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: u32) -> f64 {
+    pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: LightLeaf) -> f64 {
         self.shares.trees * self.trees.pmf(at, leaf)
     }
 

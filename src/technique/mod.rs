@@ -8,6 +8,7 @@
 
 mod distant;
 mod features;
+mod instances;
 mod learned;
 mod mixture;
 mod segment;

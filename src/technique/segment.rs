@@ -13,7 +13,7 @@ use core::f64::consts::PI;
 use glam::{DVec3, Vec3};
 
 use super::{LightScene, Viewpoint, trees};
-use crate::light::LightKind;
+use crate::light::{LightKind, LightLeaf};
 use crate::math;
 use crate::receiver::ShadingPoint;
 use crate::tlas::{ClusterAlong, ClusterMoments, Clusters, Stretch};
@@ -159,8 +159,8 @@ impl Distances {
                 if visited > MOST_PORTALS || scene.lights.extras().groups_of(leaf) & groups == 0 {
                     return;
                 }
-                let weight = scene.lights.light(leaf).weight() * scene.lights.scale(leaf);
                 if let Some([start, end]) = shadow(scene, leaf, &stretch, toward) {
+                    let weight = scene.lights.light(leaf).weight() * scene.lights.scale(LightLeaf::alone(leaf));
                     self.fill(start, end, power * weight);
                 }
             });

@@ -1,7 +1,7 @@
 //! The tree over the lights, then the tree over the texture of the one that was chosen.
 
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
-use crate::light::{DrawnPoint, LightKind, LightPoint, LightView, LightViewKind};
+use crate::light::{DrawnPoint, LightKind, LightLeaf, LightPoint, LightView, LightViewKind};
 use crate::math::{at_least, only_if};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::Variate;
@@ -17,11 +17,12 @@ pub(crate) struct Trees<'t> {
 
 impl Trees<'_> {
     /// Returns the probability of a light, or the expected number of visits if the tree is split.
-    pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: u32) -> f64 {
-        match self.splitting {
-            None => at.scene.tlas.pmf(leaf, at, self.first),
-            Some(splitting) => at.scene.tlas.expected_count(leaf, at, splitting),
-        }
+    pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: LightLeaf) -> f64 {
+        let pmf = match self.splitting {
+            None => at.scene.tlas.pmf(leaf.top, at, self.first),
+            Some(splitting) => at.scene.tlas.expected_count(leaf.top, at, splitting),
+        };
+        pmf * at.pmf_within(leaf)
     }
 
     /// Draws a point on a light that has been chosen with this probability, or is visited this many times.
@@ -29,7 +30,7 @@ impl Trees<'_> {
     pub(crate) fn sample_on<R>(
         &self,
         at: &Viewpoint<'_>,
-        leaf: u32,
+        leaf: LightLeaf,
         pmf: f64,
         u: [Variate; 2],
         then: impl FnOnce(PlacedPoint, Density, &LightView<'_>) -> Option<R>,
@@ -55,7 +56,7 @@ impl Technique for Trees<'_> {
         u: Variates,
         then: impl FnOnce(PlacedPoint, Density, &LightView<'_>) -> Option<R>,
     ) -> Option<R> {
-        let (leaf, pmf) = at.scene.tlas.sample(at, self.first, u.choice)?;
+        let (leaf, pmf) = at.choose(self.first, u.choice)?;
         self.sample_on(at, leaf, pmf, u.point, then)
     }
 
@@ -79,6 +80,10 @@ pub(super) fn irradiance(at: &Viewpoint<'_>, first: Option<&FirstWeights>) -> f3
     if at.scene.lights.is_empty() {
         return 0.0;
     }
-    let weight = || at.scene.lights.light(0).weight() * at.scene.lights.scale(0);
-    at.view(0).map_or(0.0, |view| view.irradiance(weight()))
+    if let Some(irradiance) = at.irradiance_of_instance(0) {
+        return irradiance;
+    }
+    let leaf = LightLeaf::alone(0);
+    let weight = || at.scene.lights.light(0).weight() * at.scene.lights.scale(leaf);
+    at.view(leaf).map_or(0.0, |view| view.irradiance(weight()))
 }

@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use glam::Vec3;
 
 use crate::env::{EnvironmentView, RegionMoments};
-use crate::light::{LightKind, LightPoint, LightView, LightsView};
+use crate::light::{LightKind, LightLeaf, LightPoint, LightView, LightsView};
 use crate::math::{at_least, only_if};
 use crate::receiver::ShadingPoint;
 use crate::tlas::{FactorBytes, LeafOracle, TlasView};
@@ -48,15 +48,22 @@ impl<'a> LightScene<'a> {
         &self,
         origin: Vec3,
         direction: Vec3,
-        mut is_wanted: impl FnMut(u32) -> bool,
+        mut is_wanted: impl FnMut(LightLeaf) -> bool,
         mut visit: impl FnMut(LightPoint),
     ) {
-        self.tlas.cross(origin, direction, |leaf| {
-            let point = if is_wanted(leaf) { self.lights.light(leaf).intersect(origin, direction) } else { None };
+        let mut visit_leaf = |leaf: LightLeaf| {
+            let point = if is_wanted(leaf) { self.lights.intersect(leaf, origin, direction) } else { None };
             if let Some(point) = point {
                 visit(LightPoint { leaf, point });
             }
-        });
+        };
+        if self.lights.has_instances() {
+            self.tlas.cross(origin, direction, |leaf| {
+                self.visit_within(leaf, &mut visit_leaf, |placed, visit| placed.cross(origin, direction, visit));
+            });
+        } else {
+            self.tlas.cross(origin, direction, |leaf| visit_leaf(LightLeaf::alone(leaf)));
+        }
     }
 }
 
@@ -82,8 +89,8 @@ impl Viewpoint<'_> {
 
     /// Returns a light as seen from here; `None` if nothing can arrive from it.
     #[inline]
-    pub(crate) fn view(&self, leaf: u32) -> Option<LightView<'_>> {
-        if !self.receives(leaf) {
+    pub(crate) fn view(&self, leaf: LightLeaf) -> Option<LightView<'_>> {
+        if !self.receives(leaf.top) {
             return None;
         }
         self.scene.lights.view(leaf, &self.x, self.scene.directional_environment())
@@ -131,7 +138,11 @@ impl LeafOracle for Viewpoint<'_> {
 
     #[inline]
     fn is_visible(&self, leaf: u32) -> bool {
-        self.scene.lights.energy > 0.0 && self.receives(leaf) && self.scene.lights.light(leaf).is_visible(&self.x)
+        let lights = &self.scene.lights;
+        // As with any cluster of lights, that of an instance is left to what is inside.
+        lights.energy > 0.0
+            && self.receives(leaf)
+            && (lights.is_instance(leaf) || lights.light(leaf).is_visible(&self.x))
     }
 
     fn irradiance_per_area(&self, leaf: u32) -> f32 {

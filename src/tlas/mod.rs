@@ -11,6 +11,7 @@ mod tests;
 mod tree;
 mod validate;
 mod walk;
+mod words;
 
 pub use arity::Arity;
 #[cfg(test)]

@@ -208,8 +208,8 @@ fn same_bits<const N: usize>(lights: &[(LightBounds, Moments)], scale: f32, pcg:
         let axis = (lights[i % lights.len()].1.mean - origin).normalize();
         let inverse = axis.recip();
         let lanes = |level: InstructionSet| {
-            let crossed = level.run(Crossed { node, origin, inverse });
-            (crossed, level.run(Met { node, origin, axis, cone: [0.6, 0.8] }))
+            let crossed = level.run(Crossed::<N, false> { node, origin, inverse, margin: 0.0 });
+            (crossed, level.run(Met::<N, false> { node, origin, axis, cone: [0.6, 0.8], margin: 0.0 }))
         };
         let mut all = InstructionSet::all().map(lanes);
         let first = all.next();

@@ -10,6 +10,8 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Scene, random_point};
 use crate::groups::scene as grouped;
+use crate::instances;
+use crate::instances::town::Town;
 use crate::kinds::{mixed, pdf_again};
 use fanlight::{LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId, Visibility};
 use glam::Vec3;
@@ -22,11 +24,15 @@ const KINDS: usize = 12;
 const GROUPS: usize = 6;
 /// Scenes with learned visibility.
 const LEARNED: usize = 6;
+/// Scenes of instances.
+const TOWNS: usize = 12;
 
 /// End of the scenes that mix all kinds.
 const LAST_KIND: usize = SCENES + KINDS;
 /// End of the scenes with light groups.
 const LAST_GROUPS: usize = LAST_KIND + GROUPS;
+/// End of the scenes with learned visibility.
+const LAST_LEARNED: usize = LAST_GROUPS + LEARNED;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// The same scenes at points with lobes.
@@ -184,6 +190,33 @@ fn line_of_learned(number: usize) -> String {
     format!("{number:2} learned {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene of instances.
+fn line_of_town(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let town = Town::random(&mut pcg, number % 5, number % 2 == 0, number % 5);
+    let lights = town.build(ARITIES[number % 3]);
+    let splitting = Splitting::new(0.7, 2);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    let emission = lights.emission();
+    for i in 0..POINTS {
+        let x = instances::point(&town, &mut pcg, i);
+        let at = lights.at(&x);
+        let u = pcg.cube();
+        for sample in at.sample(u).iter().chain(sample_split(&at, u, &splitting).iter().take(8)) {
+            drawn += 1;
+            let hit = sample.hit().expect("a triangle");
+            hash.add(&[f32::from_bits(hit.instance.map_or(u32::MAX, |instance| instance.index()))]);
+            hash.add_sample(sample);
+            hash.add(&[at.pdf(&hit), at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
+        }
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            [ray.position, ray.normal, ray.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[ray.pdf, ray.pmf, emission.pdf_ray(x.position, pcg.direction())]);
+        }
+    }
+    format!("{number:2} instances {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -196,12 +229,13 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED };
+    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED + TOWNS };
     let line = |i| match i {
         0..SCENES => line(i, has_lobes),
         SCENES..LAST_KIND => line_of_kinds(i - SCENES),
         LAST_KIND..LAST_GROUPS => line_of_groups(i - LAST_KIND),
-        _ => line_of_learned(i - LAST_GROUPS),
+        LAST_GROUPS..LAST_LEARNED => line_of_learned(i - LAST_GROUPS),
+        _ => line_of_town(i - LAST_LEARNED),
     };
     let found = parallel::map(SCENES + more, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {

@@ -22,6 +22,7 @@ mod fuzz_regressions;
 #[cfg(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))]
 mod golden;
 mod groups;
+mod instances;
 mod invariance;
 mod irradiance;
 mod kinds;

@@ -3,6 +3,7 @@
 use smallvec::SmallVec;
 
 use super::view::FeaturePart;
+use crate::light::LightLeaf;
 use crate::math::{at_least, only_if};
 use crate::warp::sum;
 
@@ -15,13 +16,13 @@ use crate::warp::sum;
 pub(super) const MAX_VISIBLE: usize = 64;
 
 /// Stands for all portals.
-pub(super) const ANY_PORTAL: u32 = u32::MAX;
+pub(super) const ANY_PORTAL: LightLeaf = LightLeaf::alone(u32::MAX);
 
 /// A feature, or a group of features, through a part of a portal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct VisibleFeature {
     /// Leaf of the portal, or [`ANY_PORTAL`].
-    pub(super) leaf: u32,
+    pub(super) leaf: LightLeaf,
     /// Node of the tree over the features.
     pub(super) node: u32,
     pub(super) part: FeaturePart,
@@ -52,7 +53,7 @@ impl VisibleFeatures {
     }
 
     /// Appends a feature. Without room for it, it replaces the last one.
-    pub(super) fn push(&mut self, leaf: u32, node: u32, part: FeaturePart, weight: f32) {
+    pub(super) fn push(&mut self, leaf: LightLeaf, node: u32, part: FeaturePart, weight: f32) {
         self.truncate(MAX_VISIBLE - 1);
         self.visible.push(VisibleFeature { leaf, node, part });
         self.weights.push(weight);
@@ -87,7 +88,7 @@ impl VisibleFeatures {
         for (visible, weight) in self.visible.iter().zip(&mut self.weights) {
             if visible.leaf != ANY_PORTAL {
                 // Positive whatever underflows.
-                let dimmed = at_least(*weight * factor(visible.leaf), f32::MIN_POSITIVE);
+                let dimmed = at_least(*weight * factor(visible.leaf.top), f32::MIN_POSITIVE);
                 *weight = only_if(*weight > 0.0, dimmed);
             }
         }

@@ -15,7 +15,7 @@ mod view;
 
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
 use crate::env::FeatureNode;
-use crate::light::{LightKind, LightPoint, LightView, LightViewKind, LocalPoint};
+use crate::light::{LightLeaf, LightPoint, LightView, LightViewKind, LocalPoint};
 use crate::math;
 use crate::warp::{Variate, pick, sum};
 
@@ -56,9 +56,9 @@ impl VisibleFeatures {
         // Weights of all parts that were measured, how many they are, and how many lights were only counted.
         let (mut sum, mut measured, mut more) = (0.0, 0, 0);
         let cone = [sin_radius, math::sqrt((1.0 - sin_radius * sin_radius).max(0.0))];
-        let visit = |leaf: u32| {
+        let visit = |leaf: LightLeaf| {
             let scale = at.scene.lights.scale(leaf);
-            if !at.scene.lights.light(leaf).is_portal() || scale == 0.0 {
+            if !at.scene.lights.is_portal(leaf) || scale == 0.0 {
                 return;
             }
             if measured > end - start && measured >= LEAST_MEASURED {
@@ -77,9 +77,9 @@ impl VisibleFeatures {
             });
         };
         if sin_radius < 1.0 {
-            at.scene.tlas.meet(at.x.position, axis, cone, visit);
+            at.scene.meet(at.x.position, axis, cone, visit);
         } else {
-            (0..at.scene.lights.len() as u32).for_each(visit);
+            at.scene.for_each_light(visit);
         }
         if measured > end - start {
             let all = sum * (1.0 + more as f32 / measured as f32);
@@ -171,10 +171,10 @@ impl Technique for VisibleFeatures {
 fn least_crossed(at: &Viewpoint<'_>, direction: glam::Vec3) -> Option<LightPoint> {
     let least = core::cell::Cell::new(None::<LightPoint>);
     let lights = &at.scene.lights;
-    let is_wanted = |leaf: u32| {
-        let light = lights.light(leaf);
+    let is_wanted = |leaf: LightLeaf| {
         let is_less = least.get().is_none_or(|least| leaf <= least.leaf);
-        light.is_portal() && lights.scale(leaf) != 0.0 && is_less && at.receives(leaf) && light.is_visible(&at.x)
+        let is_portal = lights.is_portal(leaf) && lights.scale(leaf) != 0.0;
+        is_portal && is_less && at.receives(leaf.top) && lights.is_visible(leaf, &at.x)
     };
     let visit = |point: LightPoint| least.set(Some(point));
     at.scene.cross(at.x.position, direction, is_wanted, visit);

@@ -71,7 +71,7 @@ impl FirstWeights {
     }
 
     #[inline(always)]
-    fn lanes<const N: usize>(&self) -> [f32; N] {
+    pub(super) fn lanes<const N: usize>(&self) -> [f32; N] {
         core::array::from_fn(|lane| self.0[lane])
     }
 
@@ -161,11 +161,11 @@ impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for PmfWalk<'_, N, S, L> {
 }
 
 /// The weights of one node.
-struct NodeWeights<'a, const N: usize, S, L> {
-    tlas: &'a WideTree<'a, N>,
-    node: usize,
-    oracle: &'a S,
-    lobe: L,
+pub(super) struct NodeWeights<'a, const N: usize, S, L> {
+    pub(super) tlas: &'a WideTree<'a, N>,
+    pub(super) node: usize,
+    pub(super) oracle: &'a S,
+    pub(super) lobe: L,
 }
 
 impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for NodeWeights<'_, N, S, L> {

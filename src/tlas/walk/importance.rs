@@ -261,7 +261,8 @@ impl<const N: usize> Node<N> {
         let (mut largest, mut doubtful, mut near, mut mixed) = (0, 0, 0, 0);
         for i in 0..N {
             let counts = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
-            let half = counts * half_step;
+            // A difference, as that of zero is folded away.
+            let half = counts * half_step - Vec3::splat(x.lobe.inset());
             let center = Vec3::new(f32::from(centers[0][i]), f32::from(centers[1][i]), f32::from(centers[2][i]));
             let center = origin + center * step;
 

@@ -12,6 +12,7 @@ pub(in crate::tlas) mod ray;
 mod segment;
 mod shaped;
 mod split;
+mod within;
 
 use glam::Vec3;
 

@@ -21,14 +21,14 @@ impl<const N: usize> WideTree<'_, N> {
     /// crosses.
     pub(crate) fn cross(&self, origin: Vec3, direction: Vec3, visit: impl FnMut(u32)) {
         let (level, inverse) = (InstructionSet::best(), direction.recip());
-        self.walk(|node| level.run(Crossed { node, origin, inverse }), visit);
+        self.walk(|node| level.run(Crossed::<N, false> { node, origin, inverse, margin: 0.0 }), visit);
     }
 
     /// Calls `visit` for each leaf whose box may hold a point in a cone around a unit vector, with an angular radius of
     /// this sine and cosine.
     pub(crate) fn meet(&self, origin: Vec3, axis: Vec3, cone: [f32; 2], visit: impl FnMut(u32)) {
         let level = InstructionSet::best();
-        self.walk(|node| level.run(Met { node, origin, axis, cone }), visit);
+        self.walk(|node| level.run(Met::<N, false> { node, origin, axis, cone, margin: 0.0 }), visit);
     }
 
     /// Visits the leaves in the lanes of each node, a set of bits, that `entered` tells. Walks on parent pointers, so
@@ -68,14 +68,15 @@ impl<const N: usize> WideTree<'_, N> {
     }
 }
 
-/// Lanes whose boxes a ray crosses.
-pub(in crate::tlas) struct Crossed<'a, const N: usize> {
+/// Lanes whose boxes a ray crosses; if `WIDENED`, boxes that are wider by a margin on all sides.
+pub(in crate::tlas) struct Crossed<'a, const N: usize, const WIDENED: bool> {
     pub(in crate::tlas) node: &'a Node<N>,
     pub(in crate::tlas) origin: Vec3,
     pub(in crate::tlas) inverse: Vec3,
+    pub(in crate::tlas) margin: f32,
 }
 
-impl<const N: usize> Kernel for Crossed<'_, N> {
+impl<const N: usize, const WIDENED: bool> Kernel for Crossed<'_, N, WIDENED> {
     type Output = u32;
 
     /// Slab test. A ray in the plane of a slab gives NaN there, which the comparisons pass over.
@@ -86,8 +87,9 @@ impl<const N: usize> Kernel for Crossed<'_, N> {
         for i in 0..N {
             let (mut enter, mut leave) = (0.0, f32::INFINITY);
             for axis in 0..3 {
-                let a = (low[axis][i] - self.origin[axis]) * self.inverse[axis];
-                let b = (high[axis][i] - self.origin[axis]) * self.inverse[axis];
+                let (low, high) = (low[axis][i] - self.origin[axis], high[axis][i] - self.origin[axis]);
+                let (low, high) = if WIDENED { (low - self.margin, high + self.margin) } else { (low, high) };
+                let (a, b) = (low * self.inverse[axis], high * self.inverse[axis]);
                 enter = at_least(at_most(b, a), enter);
                 leave = at_most(at_least(a, b), leave);
             }
@@ -99,15 +101,16 @@ impl<const N: usize> Kernel for Crossed<'_, N> {
     }
 }
 
-/// Lanes whose boxes, or the balls around them, reach a cone.
-pub(in crate::tlas) struct Met<'a, const N: usize> {
+/// Lanes whose boxes, or the balls around them, reach a cone; if `WIDENED`, balls that are wider by a margin.
+pub(in crate::tlas) struct Met<'a, const N: usize, const WIDENED: bool> {
     pub(in crate::tlas) node: &'a Node<N>,
     pub(in crate::tlas) origin: Vec3,
     pub(in crate::tlas) axis: Vec3,
     pub(in crate::tlas) cone: [f32; 2],
+    pub(in crate::tlas) margin: f32,
 }
 
-impl<const N: usize> Kernel for Met<'_, N> {
+impl<const N: usize, const WIDENED: bool> Kernel for Met<'_, N, WIDENED> {
     type Output = u32;
 
     /// By the distance of a ball's center from the cone's surface, negative inside, against its radius.
@@ -125,6 +128,7 @@ impl<const N: usize> Kernel for Met<'_, N> {
             let distance2 = center.length_squared();
             let across = math::sqrt(at_least(distance2 - along * along, 0.0));
             let slack = 0.5 * math::sqrt((to - from).length_squared()) + RAY_WIDENING * math::sqrt(distance2);
+            let slack = if WIDENED { slack + self.margin } else { slack };
             met |= u32::from((along >= -slack) & (across * cos - along * sin <= slack)) << i;
         }
         met & self.node.children()

@@ -3,11 +3,11 @@
 use std::sync::OnceLock;
 
 use fanlight::{
-    DiskLight, DistantLight, Environment, Filter, Illumination, Lamp, LightSample, LightSampler, LightSamplerBuilder,
-    Mesh, PointLight, Profile, ProfileLight, ShadingPoint, Sides, SphereLight, SpotLight, Texture, TextureId,
-    TubeLight, Visibility, Weight, Wrap,
+    DiskLight, DistantLight, Environment, Filter, Illumination, Instance, Lamp, LightSample, LightSampler,
+    LightSamplerBuilder, Mesh, PointLight, Profile, ProfileLight, ShadingPoint, Sides, SphereLight, SpotLight, Texture,
+    TextureId, TubeLight, Visibility, Weight, Wrap,
 };
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Affine3A, Mat3, Vec2, Vec3};
 
 use super::reader::Reader;
 
@@ -35,7 +35,24 @@ pub(crate) fn lights(reader: &mut Reader<'_>) -> Option<LightSampler> {
             let _ = builder.add_light_to(soup.groups(), lamp);
         }
     }
+    add_instances(&mut builder, &meshes, &textures);
     builder.build().ok()
+}
+
+/// Instances of the meshes, where one of them has many vertices: by no byte of its own.
+fn add_instances(builder: &mut LightSamplerBuilder<'_>, meshes: &[Soup], textures: &[TextureId]) {
+    let parts: Vec<Mesh<'_>> = meshes.iter().map(|soup| soup.mesh(textures)).collect();
+    let Some(frame) = meshes.iter().find(|soup| soup.positions.len() >= 8) else { return };
+    // One that is refused leaves the builder as it was.
+    let objects = [builder.add_object(&parts), builder.add_object(&parts[..1])];
+    for (i, object) in objects.into_iter().flatten().enumerate() {
+        for corner in frame.positions.chunks_exact(4).chain([&frame.positions[1..5]]) {
+            let [x, y, z, place] = [0, 1, 2, 3].map(|k| corner[(k + i) % 4]);
+            let transform = Affine3A::from_mat3_translation(Mat3::from_cols(x, y, z), place);
+            let _ = builder.add_instance(Instance::new(object, transform).scaled(frame.uvs[i].x));
+        }
+        let _ = builder.add_instance(Instance::new(object, Affine3A::from_translation(frame.positions[0])));
+    }
 }
 
 /// The bytes of lights that are accepted, of several kinds. Each is built once only.
@@ -61,13 +78,20 @@ fn some_lights(kind: u8) -> LightSampler {
     let count = if kind & 4 != 0 { indices.len() } else { 1 };
     let indices = &indices[..count];
     let mesh = if kind & 8 != 0 { Mesh::portal(&positions, indices) } else { Mesh::emitter(&positions, indices) };
-    builder.add_mesh(&mesh.uvs(&uvs).weight(weight).sides(Sides::Two)).expect("a valid mesh");
+    let mesh = mesh.uvs(&uvs).weight(weight).sides(Sides::Two);
+    builder.add_mesh(&mesh).expect("a valid mesh");
     if kind == 15 {
         // What few scenes have.
         let profile = Profile { vertical: &[0.0, 1.0], horizontal: &[0.0], intensities: &[1.0, 0.5] };
         let profile = builder.add_profile(&profile).expect("a valid profile");
         builder.add_light_to(3, ProfileLight::new(Vec3::X, Vec3::Z, profile, 1.0)).expect("a valid light");
         builder.add_light_to(1, DistantLight::new(Vec3::Z, 1.0).angular_radius(0.1)).expect("a valid light");
+    }
+    // An instance of every other kind.
+    if kind & 1 == kind >> 2 & 1 {
+        let object = builder.add_object(&[mesh]).expect("a valid object");
+        let transform = Affine3A::from_scale(Vec3::new(1.0, -0.5, 2.0));
+        builder.add_instance(Instance::new(object, transform)).expect("a valid instance");
     }
     builder.build().expect("few triangles")
 }

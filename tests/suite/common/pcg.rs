@@ -4,6 +4,7 @@ use glam::{Mat3, Vec3};
 use rand_pcg::rand_core::Rng;
 
 /// PCG32 (O'Neill 2014), XSH-RR 64/32, with what the tests draw from it.
+#[derive(Clone)]
 pub(crate) struct Pcg32(rand_pcg::Pcg32);
 
 impl Pcg32 {
