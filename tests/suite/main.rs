@@ -38,4 +38,5 @@ mod segments;
 mod selection;
 mod stress;
 mod suns;
+mod together;
 mod visibility;
