@@ -82,7 +82,14 @@ fn names_in_the_documentation_exist() {
         .collect();
     known.extend(FOREIGN.map(str::to_owned));
     let texts = ["README.md", "docs/ACCURACY.md", "docs/ARCHITECTURE.md", "docs/INTEGRATION.md", "docs/NOTATION.md"];
-    let more = ["docs/FIRST_HOUR.md", "docs/SPEED.md", "docs/STABILITY.md", "docs/gallery/README.md"];
+    let more = [
+        "docs/BUFFERS.md",
+        "docs/FIRST_HOUR.md",
+        "docs/VISIBILITY.md",
+        "docs/SPEED.md",
+        "docs/STABILITY.md",
+        "docs/gallery/README.md",
+    ];
     let (mut unknown, mut count) = (Vec::new(), 0);
     for name in texts.into_iter().chain(more) {
         for (line, word) in names(&read(&root.join(name))) {
@@ -94,6 +101,32 @@ fn names_in_the_documentation_exist() {
     }
     assert!(count > 200, "only {count} names are found");
     assert!(unknown.is_empty(), "no such names in the code:\n{}", unknown.join("\n"));
+}
+
+/// Every section of the bytes is described.
+#[test]
+fn the_page_of_the_buffers_names_all_sections() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut paths = Vec::new();
+    files(&root.join("src"), &mut paths);
+    let read = |path: &Path| fs::read_to_string(path).expect("the file can be read");
+    let page = read(&root.join("docs/BUFFERS.md"));
+    let (mut missing, mut count) = (Vec::new(), 0);
+    // The format's own tests have a section too.
+    for path in paths.iter().filter(|path| !path.ends_with("src/buffers.rs")) {
+        let text = read(path);
+        for rest in text.split("b\"").skip(1) {
+            let tag = rest.split('"').next().unwrap_or("");
+            if tag.len() == 4 && tag.bytes().all(|c| c.is_ascii_uppercase()) {
+                count += 1;
+                if !page.contains(&format!("| `{tag}` |")) {
+                    missing.push(format!("{}: {tag}", path.display()));
+                }
+            }
+        }
+    }
+    assert!(count > 20, "only {count} sections are found");
+    assert!(missing.is_empty(), "not in docs/BUFFERS.md:\n{}", missing.join("\n"));
 }
 
 #[test]
