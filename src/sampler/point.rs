@@ -182,9 +182,9 @@ impl<'a> PointSampler<'a> {
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, LightLeaf::alone(leaf)) as f32)
     }
 
-    /// Estimates the irradiance at the shading point from all lights together, as if nothing were in between: radiance times
-    /// the cosine, integrated over directions. At a point with a lobe, the receiver's weight stands in for the cosine; in a
-    /// volume without one it is 1. Never NaN, and zero only where nothing can arrive.
+    /// Estimates the irradiance at the shading point from all lights together, as if nothing were in between but what learned
+    /// visibility knows of: radiance times the cosine, integrated over directions. At a point with a lobe, the receiver's weight
+    /// stands in for the cosine; in a volume without one it is 1. Never NaN, and zero only where nothing can arrive.
     ///
     /// It is for a choice between these lights and others that the host samples by itself. It is the estimate that
     /// [`Self::sample`] is guided by, from moments of clusters: good to some ten percent at most points, and off by more next

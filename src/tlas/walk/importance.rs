@@ -310,7 +310,8 @@ impl<const N: usize> Node<N> {
 
             weights[i] = only_if(!culled, within_range(energy * term));
             largest = largest.max(weights[i].to_bits());
-            let averted = facing < EDGE_COSINE * distance;
+            // Many normals are left to what is below: an instance is as good as never averted.
+            let averted = (facing < EDGE_COSINE * distance) & (length == f32::from(u8::MAX));
             doubtful |= u32::from((straddles | averted) & !culled) << i;
             near |= u32::from((radius2 > OPENING * OPENING * distance2) & !culled) << i;
             mixed |= u32::from(is_mixed & !culled) << i;
