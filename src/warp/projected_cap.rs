@@ -199,8 +199,8 @@ mod tests {
                 let cap = SphericalCap { axis, sin: angle.sin(), cos: angle.cos() };
                 let Some([mean, exact, deviation]) = measure(&cap) else { panic!("{angle} {step}") };
                 assert!((mean - exact).abs() < 0.01 * exact + 1e-3, "{angle} {step}: {mean} {exact}");
-                // A thin ring at the horizon is hardly lit.
-                assert!(deviation < 0.7 || exact < 0.5, "{angle} {step}: {deviation}");
+                // Rows through the gap are drawn as often as others; a thin ring at the horizon is hardly lit.
+                assert!(deviation < 1.0 || exact < 0.5, "{angle} {step}: {deviation}");
             }
         }
     }
