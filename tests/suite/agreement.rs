@@ -141,7 +141,8 @@ fn samples_have_the_density_that_pdf_finds() {
 #[test]
 fn samples_for_lobes_have_the_density_that_pdf_finds() {
     let [scenes, samples] = tier().agreement;
-    examine_all(scenes, samples, 2, true);
+    // Densities are those of other trees all the same: four million are enough.
+    examine_all(scenes, samples * 2 / 5, 2, true);
 }
 
 #[test]
