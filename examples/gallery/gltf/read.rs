@@ -93,7 +93,7 @@ impl Reader<'_> {
         }
         let [low, high] = self.check()?;
         self.place_camera(low, high)?;
-        self.add_lamps((high - low).length())?;
+        self.add_lamps()?;
         self.conclude();
         Ok(())
     }
@@ -250,7 +250,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn add_lamps(&mut self, diagonal: f32) -> Result<(), Error> {
+    fn add_lamps(&mut self) -> Result<(), Error> {
         for index in self.hierarchy.visible.clone() {
             let node = &self.document.nodes[index];
             let within = |error: Error| Error::from(format!("{}: {error}", self.document.node(index)));
@@ -259,9 +259,9 @@ impl Reader<'_> {
             if !global.is_finite() || global.w_axis.truncate().abs().max_element() > LARGEST {
                 return Err(within(format!("{called} is at {}", global.w_axis.truncate()).into()));
             }
-            lamps::add(&mut self.model, &lamp, &called, &global, diagonal, &mut self.notes)
+            lamps::add(&mut self.model, &lamp, &called, &global, &mut self.notes)
                 .map_err(|error| within(format!("{called}: {error}").into()))?;
-            self.contents.push(format!("{called} of {}: {}", self.document.node(index), lamp.kind.escape_debug()));
+            self.contents.push(format!("{called} of {}: {}", self.document.node(index), lamps::described(&lamp)));
         }
         Ok(())
     }
@@ -281,18 +281,22 @@ impl Reader<'_> {
                 materials.len(),
                 images.len()
             ),
-            format!("triangles: {triangles}, portal meshes: {portals}, emitting meshes: {lights}"),
+            format!(
+                "triangles: {triangles}, portal meshes: {portals}, emitting meshes: {lights}, lights without a surface: {}",
+                self.model.lamps.len()
+            ),
         ];
         lines.append(&mut self.contents);
         lines.append(&mut contents::list(self.document, &self.model, &self.uses));
         lines.extend((0..images.len()).map(|i| format!("{}: {}", self.document.image(i), self.images.state(i))));
         self.contents = lines;
+        let lights = lights + self.model.lamps.len();
         if lights + portals == 0 && self.model.sky.is_none() {
             self.notes.add("nothing emits light, and there is no environment: all is black".to_owned());
         } else if lights + portals == 0 {
             let prefix = &self.model.portal_prefix;
             self.notes.add(format!(
-                "no material emits light, and none that lets light through has a name that starts with `{prefix}`: \
+                "there are no lamps, no material emits light, and none that lets light through has a name that starts with `{prefix}`: \
                  there is nothing to gain"
             ));
         }

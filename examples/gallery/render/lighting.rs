@@ -3,14 +3,19 @@
 
 pub(crate) use fanlight::{Filter, Illumination, Wrap};
 
-use fanlight::{Emission, Hit, LightSampler, Mesh, MeshId, PointSampler, RaySegment, ShadingPoint, Sides, TriangleId};
+use fanlight::{
+    DistantLight, Emission, Hit, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, PointLight,
+    PointSampler, RaySegment, SampledLight, ShadingPoint, Sides, SpotLight, TriangleId,
+};
 use glam::Vec3;
 
 use super::Error;
 use super::bsdf::Bsdf;
+use super::lamp::{Lamp, LampKind};
 use super::material::{Lobe, Material};
 use super::model::Model;
 use super::scene::Point;
+use super::sky::LUMINANCE;
 use super::weights::{clear, colored, emission, environment};
 
 /// A direction worth tracing.
@@ -20,6 +25,9 @@ pub(crate) struct Proposal {
     pub(crate) pdf: f32,
     /// How far away the point is that alone the density is for; `None` if it is for all along the direction.
     pub(crate) distance: Option<f32>,
+    /// Number of the lamp that was chosen, if it is one. No ray finds it by chance, and the density is the probability of
+    /// that choice.
+    pub(crate) lamp: Option<usize>,
 }
 
 /// The emitters, and the sky with the portals that it is seen through.
@@ -29,6 +37,8 @@ pub(crate) struct Lights {
     ids: Vec<Option<TriangleId>>,
     /// Meshes below this number are emitters, the others portals.
     emitters: u32,
+    /// Number of all meshes.
+    meshes: u32,
 }
 
 impl Lights {
@@ -61,18 +71,27 @@ impl Lights {
             let portal = Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs);
             weight.add(&mut builder, portal.sides(sides(&model.materials[mesh.material])))?;
         }
+        for lamp in &model.lamps {
+            add_lamp(&mut builder, lamp)?;
+        }
         let mut next = (0..).map(MeshId::from_index);
         let ids = model.meshes.iter().flat_map(|mesh| {
             let number = emits(&mesh).then(|| next.next()).flatten();
             (0..mesh.indices.len() as u32).map(move |triangle| number.map(|mesh| TriangleId::new(mesh, triangle)))
         });
-        Ok(Self { ids: ids.collect(), emitters: emitters.len() as u32, sampler: builder.build()? })
+        let meshes = (emitters.len() + portals.len()) as u32;
+        Ok(Self { ids: ids.collect(), emitters: emitters.len() as u32, meshes, sampler: builder.build()? })
+    }
+
+    /// Whether rays of light start anywhere but at lamps.
+    pub(crate) const fn have_surfaces(&self) -> bool {
+        self.meshes > 0
     }
 
     /// A direction to the sky, bright parts more often than dark ones.
     pub(crate) fn sample_environment(&self, u: [f32; 2]) -> Option<Proposal> {
         let sample = self.sampler.environment().sample(u)?;
-        Some(Proposal { direction: sample.direction, pdf: sample.pdf, distance: None })
+        Some(Proposal { direction: sample.direction, pdf: sample.pdf, distance: None, lamp: None })
     }
 
     /// Density per solid angle of a direction under [`sample_environment`](Self::sample_environment).
@@ -127,10 +146,9 @@ pub(crate) struct LightsAt<'a>(PointSampler<'a>);
 impl LightsAt<'_> {
     /// A direction to a light, by what comes from there and counts at the point.
     pub(crate) fn sample(&self, u: [f32; 3]) -> Option<Proposal> {
-        let sample = self.0.sample(u)?;
         // Not `sample.pdf`, the density of this one point: were there another portal behind this one, the same
         // direction could have been found through that.
-        Some(Proposal { direction: sample.direction, pdf: self.0.pdf_sample_direction(&sample), distance: None })
+        self.0.sample(u).map(|sample| proposal(&sample, self.0.pdf_sample_direction(&sample)))
     }
 
     /// Density per solid angle of a direction under [`sample`](Self::sample).
@@ -140,8 +158,16 @@ impl LightsAt<'_> {
 
     /// A direction with the density of the one point that was drawn: what to compare with, not what to use.
     pub(crate) fn sample_single(&self, u: [f32; 3]) -> Option<Proposal> {
-        self.0.sample(u).map(|sample| Proposal { direction: sample.direction, pdf: sample.pdf, distance: None })
+        self.0.sample(u).map(|sample| proposal(&sample, sample.pdf))
     }
+}
+
+fn proposal(sample: &LightSample, pdf: f32) -> Proposal {
+    let lamp = match sample.light {
+        SampledLight::Punctual(id) => Some(id.index() as usize),
+        _ => None,
+    };
+    Proposal { direction: sample.direction, pdf, distance: None, lamp }
 }
 
 /// A ray of light.
@@ -203,6 +229,19 @@ impl Guide {
     pub(crate) fn at(&self, position: Vec3, bsdf: &Bsdf) -> LightsAt<'_> {
         LightsAt(self.0.at(&surface(position, bsdf)))
     }
+}
+
+/// Passes in a lamp, by its luminance.
+fn add_lamp(builder: &mut LightSamplerBuilder<'_>, lamp: &Lamp) -> Result<(), Error> {
+    let strength = LUMINANCE.dot(lamp.strength);
+    match &lamp.kind {
+        LampKind::Point(position) => builder.add_light(PointLight::new(*position, strength))?,
+        LampKind::Spot(position, axis, angles) => {
+            builder.add_light(SpotLight::new(*position, *axis, strength, *angles))?
+        }
+        LampKind::Distant(axis) => builder.add_light(DistantLight::new(*axis, strength))?,
+    };
+    Ok(())
 }
 
 const fn sides(material: &Material) -> Sides {

@@ -16,12 +16,14 @@ mod daylight;
 mod file;
 #[path = "../../room/render/film.rs"]
 mod film;
+mod lamp;
 mod lighting;
 mod material;
 mod mesh;
 mod model;
 mod path;
 mod photon;
+mod power_table;
 #[path = "../../room/render/progressive.rs"]
 mod progressive;
 mod published;
@@ -40,6 +42,7 @@ pub(crate) use camera::Camera;
 pub(crate) use daylight::Daylight;
 pub(crate) use file::{read_rgb, write_rgb};
 pub(crate) use film::{Film, Image, Reference};
+pub(crate) use lamp::{Lamp, LampKind};
 pub(crate) use lighting::{Filter, Illumination, Lights, Wrap};
 pub(crate) use material::{Lobe, Material};
 pub(crate) use mesh::Mesh;

@@ -5,6 +5,7 @@ use super::alloc::sync::Arc;
 use glam::Vec3;
 
 use super::bsdf::Bsdf;
+use super::lamp::Lamp;
 use super::material::Material;
 use super::model::{Fog, Model};
 use super::scene::{Point, Scene};
@@ -15,6 +16,7 @@ pub(crate) struct World {
     pub(crate) scene: Scene,
     sky: Option<Arc<Sky>>,
     emits: bool,
+    lamps: Vec<Lamp>,
     pub(crate) fog: Option<Fog>,
 }
 
@@ -29,7 +31,7 @@ impl World {
     /// Copies the surfaces of a model.
     pub(crate) fn new(model: &Model) -> Self {
         let emits = model.materials.iter().any(Material::emits);
-        Self { scene: Scene::new(model), sky: model.sky.clone(), emits, fog: model.fog }
+        Self { scene: Scene::new(model), sky: model.sky.clone(), emits, lamps: model.lamps.clone(), fog: model.fog }
     }
 
     /// The first solid surface along a ray, and what passes the panes and the fog before it.
@@ -64,6 +66,18 @@ impl World {
             radiance *= self.passes_fog(origin, direction, f32::INFINITY) * self.light(None, direction);
         }
         Arrival { radiance, from: None }
+    }
+
+    /// Irradiance by the lamp of that number on what faces it: zero if anything solid is in the way.
+    pub(crate) fn arriving_from_lamp(&self, lamp: usize, at: Vec3) -> Vec3 {
+        let Some(lamp) = self.lamps.get(lamp) else { return Vec3::ZERO };
+        let irradiance = lamp.irradiance(at);
+        if irradiance == Vec3::ZERO {
+            return irradiance;
+        }
+        let (direction, distance) = lamp.towards(at);
+        let passed = self.scene.passes(at, direction, distance);
+        if passed == Vec3::ZERO { passed } else { irradiance * passed * self.passes_fog(at, direction, distance) }
     }
 
     /// Light that leaves the end of a ray towards its start.
