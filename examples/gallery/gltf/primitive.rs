@@ -73,7 +73,7 @@ pub(super) fn read(
         _ => vec![],
     };
     let colors = colors(data, primitive, wanted, positions.len(), notes)?;
-    let mesh = Mesh { positions, uvs, emission_uvs, colors, indices, material: wanted.material };
+    let mesh = Mesh { positions, uvs, emission_uvs, colors, indices, material: wanted.material, copies: None };
     Ok(Some((mesh, is_skinned)))
 }
 

@@ -4,18 +4,20 @@
 pub(crate) use fanlight::{Filter, Illumination, Wrap};
 
 use fanlight::{
-    DistantLight, Emission, Hit, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, PointLight,
-    PointSampler, RaySegment, SampledLight, ShadingPoint, Sides, SpotLight, TriangleId,
+    DistantLight, Emission, LightSample, LightSampler, LightSamplerBuilder, Mesh, PointLight, PointSampler, RaySegment,
+    SampledLight, ShadingPoint, Sides, SpotLight,
 };
 use glam::Vec3;
 
 use super::Error;
+use super::alloc::collections::{BTreeMap, BTreeSet};
 use super::bsdf::Bsdf;
 use super::lamp::{Lamp, LampKind};
 use super::material::{Lobe, Material};
 use super::model::Model;
 use super::scene::Point;
 use super::sky::LUMINANCE;
+use super::sources::{Meshes, Passed, Sources};
 use super::weights::{clear, colored, emission, environment};
 
 /// A direction worth tracing.
@@ -33,12 +35,8 @@ pub(crate) struct Proposal {
 /// The emitters, and the sky with the portals that it is seen through.
 pub(crate) struct Lights {
     sampler: LightSampler,
-    /// What the sampler calls the model's triangles.
-    ids: Vec<Option<TriangleId>>,
-    /// Meshes below this number are emitters, the others portals.
-    emitters: u32,
-    /// Number of all meshes.
-    meshes: u32,
+    sources: Sources,
+    passed: Passed,
 }
 
 impl Lights {
@@ -53,39 +51,64 @@ impl Lights {
         illumination: Illumination,
         factor: impl Fn(usize) -> f32,
     ) -> Result<Self, Error> {
-        let emits = |mesh: &&super::mesh::Mesh| model.materials[mesh.material].emits();
-        let emitters: Vec<_> = model.meshes.iter().filter(emits).collect();
+        let material = |mesh: &super::mesh::Mesh| &model.materials[mesh.material];
+        let firsts =
+            model.meshes.iter().scan(0, |next, mesh| Some(core::mem::replace(next, *next + mesh.indices.len())));
+        let emitters: Vec<_> = model.meshes.iter().zip(firsts).filter(|(mesh, _)| material(mesh).emits()).collect();
         let flagged = model.meshes.iter().filter(|mesh| model.is_portal(mesh));
-        let portals: Vec<_> = flagged.filter(|mesh| model.materials[mesh.material].has_holes()).collect();
+        let portals: Vec<_> = flagged.filter(|mesh| material(mesh).has_holes()).collect();
 
-        let emission: Vec<_> = emitters.iter().map(|mesh| emission(model, &model.materials[mesh.material])).collect();
-        let transmission: Vec<_> = (portals.iter().enumerate())
-            .map(|(i, mesh)| clear(model, &model.materials[mesh.material]).times(factor(i)))
-            .collect();
+        let mut meshes = Meshes::of(model);
+        // Once for each material.
+        let used: BTreeSet<_> = emitters.iter().map(|(mesh, _)| mesh.material).collect();
+        let emission: BTreeMap<_, _> =
+            used.into_iter().map(|number| (number, emission(model, &model.materials[number]))).collect();
+        let factor_of = |(i, mesh): (usize, &&super::mesh::Mesh)| match meshes.shared(mesh) {
+            None => clear(model, material(mesh)).times(factor(i)),
+            Some(_) => clear(model, material(mesh)),
+        };
+        let transmission: Vec<_> = portals.iter().enumerate().map(factor_of).collect();
         let mut builder = LightSampler::builder().illumination(illumination).environment(environment(model)?);
-        for (mesh, weight) in emitters.iter().zip(&emission) {
-            let mesh_light = Mesh::emitter(&mesh.positions, &mesh.indices).uvs(mesh.emission_uvs());
-            weight.add(&mut builder, mesh_light.sides(sides(&model.materials[mesh.material])))?;
+        let mut emitted = BTreeMap::new();
+        for (&number, weight) in &emission {
+            emitted.insert(number, weight.weight(&mut builder)?);
         }
-        for (mesh, weight) in portals.iter().zip(&transmission) {
-            let portal = Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs);
-            weight.add(&mut builder, portal.sides(sides(&model.materials[mesh.material])))?;
+        for (mesh, first) in emitters {
+            let (sides, weight) = (sides(material(mesh)), emitted[&mesh.material]);
+            meshes.add_emitter(&mut builder, mesh, first, &|mesh| {
+                Mesh::emitter(&mesh.positions, &mesh.indices).uvs(mesh.emission_uvs()).sides(sides).weight(weight)
+            })?;
+        }
+        for (i, (mesh, weight)) in portals.into_iter().zip(&transmission).enumerate() {
+            let (sides, weight) = (sides(material(mesh)), weight.weight(&mut builder)?);
+            meshes.add_portal(&mut builder, mesh, factor(i), &|mesh| {
+                Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(sides).weight(weight)
+            })?;
         }
         for lamp in &model.lamps {
             add_lamp(&mut builder, lamp)?;
         }
-        let mut next = (0..).map(MeshId::from_index);
-        let ids = model.meshes.iter().flat_map(|mesh| {
-            let number = emits(&mesh).then(|| next.next()).flatten();
-            (0..mesh.indices.len() as u32).map(move |triangle| number.map(|mesh| TriangleId::new(mesh, triangle)))
-        });
-        let meshes = (emitters.len() + portals.len()) as u32;
-        Ok(Self { ids: ids.collect(), emitters: emitters.len() as u32, meshes, sampler: builder.build()? })
+        let (sources, passed) = meshes.finish();
+        Ok(Self { sources, passed, sampler: builder.build()? })
+    }
+
+    /// What was passed in, and the memory that it takes.
+    pub(crate) fn described(&self) -> String {
+        let Passed { meshes, objects, instances } = self.passed;
+        let bytes = self.sampler.bytes();
+        let kilobytes = |bytes: usize| bytes as f64 / 1e3;
+        format!(
+            "fanlight: {} lights; {meshes} meshes, and {instances} instances of {objects} more; {:.1} kB, of which {:.1} kB \
+             are of the environment",
+            self.sampler.light_count(),
+            kilobytes(bytes.total()),
+            kilobytes(bytes.environment)
+        )
     }
 
     /// Whether rays of light start anywhere but at lamps.
     pub(crate) const fn have_surfaces(&self) -> bool {
-        self.meshes > 0
+        self.passed.meshes + self.passed.instances > 0
     }
 
     /// A direction to the sky, bright parts more often than dark ones.
@@ -130,7 +153,7 @@ impl Lights {
     /// A portal's number and a direction through it, as drawn for a point of a surface.
     pub(crate) fn sample_portal(&self, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<(usize, Vec3)> {
         let sample = self.sampler.at(&ShadingPoint::surface(position, normal)).sample(u)?;
-        let portal = sample.hit()?.triangle.mesh.index().checked_sub(self.emitters)?;
+        let portal = sample.hit()?.triangle.mesh.index().checked_sub(self.sources.emitting_meshes())?;
         Some((portal as usize, sample.direction))
     }
 
@@ -189,7 +212,7 @@ impl Outgoing<'_> {
     /// A ray from an emitter or through a portal, by the light that it brings.
     pub(crate) fn sample(&self, u: [f32; 5]) -> Option<LightRay> {
         let ray = self.emission.sample(u)?;
-        let emitted = ray.hit()?.triangle.mesh.index() < self.lights.emitters;
+        let emitted = self.lights.sources.emits(&ray.hit()?);
         Some(LightRay { origin: ray.position, direction: ray.direction, emitted })
     }
 
@@ -198,8 +221,7 @@ impl Outgoing<'_> {
     pub(crate) fn pdf(&self, position: Vec3, towards: Vec3, from: Option<&Point>) -> f32 {
         match from {
             None => self.emission.pdf_ray(position, towards),
-            Some(Point { triangle, barycentrics, .. }) => self.lights.ids[*triangle]
-                .map_or(0.0, |triangle| self.emission.pdf(&Hit::new(triangle, *barycentrics), -towards)),
+            Some(point) => self.lights.sources.hit(point).map_or(0.0, |hit| self.emission.pdf(&hit, -towards)),
         }
     }
 }
@@ -220,7 +242,9 @@ impl Guide {
         let weights: Vec<_> = papers.iter().map(|mesh| colored(model, &model.materials[mesh.material])).collect();
         let mut builder = LightSampler::builder();
         for (mesh, weight) in papers.iter().zip(&weights) {
-            weight.add(&mut builder, Mesh::emitter(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(Sides::Two))?;
+            let paper = Mesh::emitter(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(Sides::Two);
+            let weight = weight.weight(&mut builder)?;
+            builder.add_mesh(&paper.weight(weight))?;
         }
         if papers.is_empty() { Ok(None) } else { Ok(Some(Self(builder.build()?))) }
     }

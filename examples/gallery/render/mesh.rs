@@ -2,7 +2,9 @@
 
 use core::f32::consts::{PI, TAU};
 
-use glam::{Vec2, Vec3, vec2};
+use glam::{Affine3A, Vec2, Vec3, vec2};
+
+use super::alloc::sync::Arc;
 
 /// Triangles of one material.
 #[derive(Clone, Debug, Default)]
@@ -16,12 +18,37 @@ pub(crate) struct Mesh {
     pub(crate) colors: Vec<Vec3>,
     pub(crate) indices: Vec<[u32; 3]>,
     pub(crate) material: usize,
+    /// What all of these triangles are copies of, if they are.
+    pub(crate) copies: Option<Copies>,
+}
+
+/// A mesh that stands in several places, one after the other in the mesh that holds its copies.
+#[derive(Clone, Debug)]
+pub(crate) struct Copies {
+    /// The same for all meshes that hold copies of it.
+    pub(crate) object: Arc<Mesh>,
+    /// From its coordinates to the world.
+    pub(crate) places: Vec<Affine3A>,
 }
 
 impl Mesh {
     /// Nothing yet, of some material.
     pub(crate) fn of(material: usize) -> Self {
         Self { material, ..Self::default() }
+    }
+
+    /// The copy of that number, alone.
+    pub(crate) fn copy(&self, number: usize) -> Self {
+        let Some(Copies { object, .. }) = &self.copies else { return self.clone() };
+        let (vertices, triangles) = (object.positions.len(), object.indices.len());
+        let first = number * vertices;
+        let indices = self.indices[number * triangles..][..triangles].iter();
+        Self {
+            positions: self.positions[first..][..vertices].to_vec(),
+            indices: indices.map(|corners| corners.map(|i| i - first as u32)).collect(),
+            copies: None,
+            ..Self::clone(object)
+        }
     }
 
     /// Where the emission's image is read, one a vertex.

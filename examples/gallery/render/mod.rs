@@ -1,6 +1,6 @@
 //! A small path tracer for triangle meshes.
 //!
-//! What it shares with [`lighting`] and [`weights`], the only files that call `fanlight` for it, is what any renderer has: a scene to
+//! What it shares with [`lighting`], [`sources`] and [`weights`], the only files that call `fanlight` for it, is what any renderer has: a scene to
 //! cast rays into ([`scene`]), materials ([`material`], [`bsdf`]), the radiance of the sky ([`world`]), and an
 //! integrator that asks for directions and for densities of directions ([`path`], and [`photon`] for light that is
 //! traced from its source).
@@ -31,6 +31,7 @@ mod random;
 mod scene;
 #[path = "../../room/render/sky.rs"]
 mod sky;
+mod sources;
 mod technique;
 mod texel_table;
 mod vertex;
@@ -45,7 +46,7 @@ pub(crate) use film::{Film, Image, Reference};
 pub(crate) use lamp::{Lamp, LampKind};
 pub(crate) use lighting::{Filter, Illumination, Lights, Wrap};
 pub(crate) use material::{Lobe, Material};
-pub(crate) use mesh::Mesh;
+pub(crate) use mesh::{Copies, Mesh};
 pub(crate) use model::{Fog, Model};
 pub(crate) use path::PathTracer;
 pub(crate) use progressive::{Budget, Progressive};
