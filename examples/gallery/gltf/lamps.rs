@@ -81,7 +81,7 @@ pub(super) fn add(
     let kind = match light.kind.as_str() {
         "point" => LampKind::Point(position),
         "spot" => LampKind::Spot(position, forward, light.spot.angles()),
-        "directional" => LampKind::Distant(forward),
+        "directional" => LampKind::Distant(forward, 0.0),
         kind => return Err(format!("there is no type `{}`", kind.escape_debug()).into()),
     };
     model.lamps.push(Lamp { kind, strength });

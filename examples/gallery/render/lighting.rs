@@ -4,15 +4,16 @@
 pub(crate) use fanlight::{Filter, Illumination, Wrap};
 
 use fanlight::{
-    DistantLight, Emission, LightSample, LightSampler, LightSamplerBuilder, Mesh, PointLight, PointSampler, RaySegment,
-    SampledLight, ShadingPoint, Sides, SpotLight,
+    DistantLight, Emission, LightSample, LightSampler, LightSamplerBuilder, Mesh, PointLight, PointSampler, ProfileId,
+    ProfileLight, RaySegment, SampledLight, ShadingPoint, Sides, SphereLight, SpotLight,
 };
 use glam::Vec3;
 
 use super::Error;
 use super::alloc::collections::{BTreeMap, BTreeSet};
+use super::alloc::sync::Arc;
 use super::bsdf::Bsdf;
-use super::lamp::{Lamp, LampKind};
+use super::lamp::{Diagram, Lamp, LampKind};
 use super::material::{Lobe, Material};
 use super::model::Model;
 use super::scene::Point;
@@ -69,11 +70,20 @@ impl Lights {
         };
         let transmission: Vec<_> = portals.iter().enumerate().map(factor_of).collect();
         let mut builder = LightSampler::builder().illumination(illumination).environment(environment(model)?);
+        // Their numbers are those of the model.
+        let mut profiles = BTreeMap::new();
+        for lamp in &model.lamps {
+            add_lamp(&mut builder, &mut profiles, lamp)?;
+        }
         let mut emitted = BTreeMap::new();
         for (&number, weight) in &emission {
             emitted.insert(number, weight.weight(&mut builder)?);
         }
         for (mesh, first) in emitters {
+            if let Some((center, radius)) = mesh.bulb {
+                builder.add_light(SphereLight::new(center, radius, LUMINANCE.dot(material(mesh).emission)))?;
+                continue;
+            }
             let (sides, weight) = (sides(material(mesh)), emitted[&mesh.material]);
             meshes.add_emitter(&mut builder, mesh, first, &|mesh| {
                 Mesh::emitter(&mesh.positions, &mesh.indices).uvs(mesh.emission_uvs()).sides(sides).weight(weight)
@@ -84,9 +94,6 @@ impl Lights {
             meshes.add_portal(&mut builder, mesh, factor(i), &|mesh| {
                 Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(sides).weight(weight)
             })?;
-        }
-        for lamp in &model.lamps {
-            add_lamp(&mut builder, lamp)?;
         }
         let (sources, passed) = meshes.finish();
         Ok(Self { sources, passed, sampler: builder.build()? })
@@ -255,15 +262,30 @@ impl Guide {
     }
 }
 
-/// Passes in a lamp, by its luminance.
-fn add_lamp(builder: &mut LightSamplerBuilder<'_>, lamp: &Lamp) -> Result<(), Error> {
+/// Passes in a lamp, by its luminance; a diagram that several have only once.
+fn add_lamp(
+    builder: &mut LightSamplerBuilder<'_>,
+    profiles: &mut BTreeMap<*const Diagram, ProfileId>,
+    lamp: &Lamp,
+) -> Result<(), Error> {
     let strength = LUMINANCE.dot(lamp.strength);
     match &lamp.kind {
         LampKind::Point(position) => builder.add_light(PointLight::new(*position, strength))?,
         LampKind::Spot(position, axis, angles) => {
             builder.add_light(SpotLight::new(*position, *axis, strength, *angles))?
         }
-        LampKind::Distant(axis) => builder.add_light(DistantLight::new(*axis, strength))?,
+        LampKind::Luminaire(position, diagram) => {
+            let key = Arc::as_ptr(diagram);
+            let profile = match profiles.get(&key) {
+                Some(&profile) => profile,
+                None => builder.add_profile(&diagram.profile())?,
+            };
+            profiles.insert(key, profile);
+            builder.add_light(ProfileLight::new(*position, diagram.axis, profile, strength).facing(diagram.zero))?
+        }
+        LampKind::Distant(axis, radius) => {
+            builder.add_light(DistantLight::new(*axis, strength).angular_radius(*radius))?
+        }
     };
     Ok(())
 }

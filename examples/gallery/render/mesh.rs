@@ -18,6 +18,8 @@ pub(crate) struct Mesh {
     pub(crate) colors: Vec<Vec3>,
     pub(crate) indices: Vec<[u32; 3]>,
     pub(crate) material: usize,
+    /// Center and radius of the sphere that is passed to `fanlight` in place of these triangles, if they are a bulb.
+    pub(crate) bulb: Option<(Vec3, f32)>,
     /// What all of these triangles are copies of, if they are.
     pub(crate) copies: Option<Copies>,
 }
@@ -82,6 +84,11 @@ impl Mesh {
             center - radius * Vec3::new(-sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
         });
         self
+    }
+
+    /// Makes a bulb: a sphere that has to be the whole mesh.
+    pub(crate) fn bulb(self, center: Vec3, radius: f32, rings: u32) -> Self {
+        Self { bulb: Some((center, radius)), ..self.sphere(center, radius, rings) }
     }
 
     /// Adds a polygon with holes that lies in the plane of `u` and `v` through `origin`; coordinates in that plane.

@@ -43,7 +43,7 @@ pub(crate) use camera::Camera;
 pub(crate) use daylight::Daylight;
 pub(crate) use file::{read_rgb, write_rgb};
 pub(crate) use film::{Film, Image, Reference};
-pub(crate) use lamp::{Lamp, LampKind};
+pub(crate) use lamp::{Diagram, Lamp, LampKind};
 pub(crate) use lighting::{Filter, Illumination, Lights, Wrap};
 pub(crate) use material::{Lobe, Material};
 pub(crate) use mesh::{Copies, Mesh};

@@ -183,8 +183,8 @@ impl<'a> PathTracer<'a> {
             return lights_pdf;
         }
         let environment_pdf = match from {
-            None => self.techniques.lights.environment_pdf(direction),
-            Some(_) => 0.0,
+            None if self.world.has_sky() => self.techniques.lights.environment_pdf(direction),
+            _ => 0.0,
         };
         let photon_pdf = match (&self.photons, x.arrival, &x.place) {
             (Some(photons), Some(arrival), Place::Surface(point, _)) => photons.pdf(point, direction, from) / arrival,

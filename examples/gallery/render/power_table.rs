@@ -1,10 +1,10 @@
 //! Lights by their power, whatever they send to a shading point: what `fanlight` is compared with where there are lamps.
 
-use core::f32::consts::PI;
+use core::f32::consts::{PI, TAU};
 
 use glam::Vec3;
 
-use super::lamp::Lamp;
+use super::lamp::{Lamp, within};
 use super::lighting::Proposal;
 use super::model::Model;
 use super::scene::Point;
@@ -16,6 +16,8 @@ pub(crate) struct PowerTable {
     /// Emitters by their area.
     areas: TexelTable,
     lamps: Vec<Lamp>,
+    /// Those of the lamps that rays find by chance.
+    caps: Vec<usize>,
     /// Probability of the emitters, then of each lamp, each with all before it. The last one is 1.
     cumulative: Vec<f64>,
 }
@@ -35,7 +37,8 @@ impl PowerTable {
             .collect();
         let total = cumulative.last().copied().filter(|&total| total > 0.0)?;
         cumulative.iter_mut().for_each(|sum| *sum /= total);
-        Some(Self { areas, lamps: model.lamps.clone(), cumulative })
+        let caps = (0..model.lamps.len()).filter(|&lamp| model.lamps[lamp].cap().is_some()).collect();
+        Some(Self { areas, lamps: model.lamps.clone(), caps, cumulative })
     }
 
     /// A direction to a light.
@@ -49,14 +52,28 @@ impl PowerTable {
             return Some(Proposal { pdf: share * proposal.pdf, ..proposal });
         };
         let (direction, _) = self.lamps.get(lamp)?.towards(position);
+        if let Some((cosine, _)) = self.lamps[lamp].cap() {
+            let pdf = share / (TAU * (1.0 - cosine));
+            return Some(Proposal { direction: within(direction, cosine, [u, v]), pdf, distance: None, lamp: None });
+        }
         Some(Proposal { direction, pdf: share, distance: None, lamp: Some(lamp) })
     }
 
-    /// Density per solid angle of a direction that leads to a point of an emitter.
-    pub(crate) fn pdf(&self, direction: Vec3, point: &Point) -> f32 {
-        match self.share(0) {
-            0.0 => 0.0,
-            share => share * self.areas.pdf(direction, point),
+    /// Density per solid angle of a direction that leads to a point of an emitter, or out of the scene if that is `None`.
+    pub(crate) fn pdf(&self, direction: Vec3, point: Option<&Point>) -> f32 {
+        match (self.share(0), point) {
+            (share, Some(point)) if share > 0.0 => share * self.areas.pdf(direction, point),
+            (_, Some(_)) => 0.0,
+            (_, None) => self.caps.iter().map(|&lamp| self.pdf_of_cap(lamp, direction)).sum(),
+        }
+    }
+
+    fn pdf_of_cap(&self, lamp: usize, direction: Vec3) -> f32 {
+        match self.lamps[lamp].cap() {
+            Some((cosine, _)) if self.lamps[lamp].radiance(direction) != Vec3::ZERO => {
+                self.share(lamp + 1) / (TAU * (1.0 - cosine))
+            }
+            _ => 0.0,
         }
     }
 

@@ -150,7 +150,7 @@ impl ChoiceAt<'_> {
         match self {
             Self::None | Self::Single(_) => 0.0,
             Self::Fanlight(lights) => lights.pdf(direction),
-            Self::Power(table, _) => from.map_or(0.0, |point| table.pdf(direction, point)),
+            Self::Power(table, _) => table.pdf(direction, from),
             Self::Table(table, _) => from.map_or(0.0, |point| table.pdf(direction, point)),
             Self::Published(lights, x) => from.map_or(0.0, |point| lights.pdf(x, direction, point)),
         }

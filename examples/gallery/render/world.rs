@@ -17,6 +17,8 @@ pub(crate) struct World {
     sky: Option<Arc<Sky>>,
     emits: bool,
     lamps: Vec<Lamp>,
+    /// Those of them that rays find by chance.
+    caps: Vec<usize>,
     pub(crate) fog: Option<Fog>,
 }
 
@@ -31,7 +33,15 @@ impl World {
     /// Copies the surfaces of a model.
     pub(crate) fn new(model: &Model) -> Self {
         let emits = model.materials.iter().any(Material::emits);
-        Self { scene: Scene::new(model), sky: model.sky.clone(), emits, lamps: model.lamps.clone(), fog: model.fog }
+        let caps = (0..model.lamps.len()).filter(|&lamp| model.lamps[lamp].cap().is_some()).collect();
+        Self {
+            scene: Scene::new(model),
+            sky: model.sky.clone(),
+            emits,
+            lamps: model.lamps.clone(),
+            caps,
+            fog: model.fog,
+        }
     }
 
     /// The first solid surface along a ray, and what passes the panes and the fog before it.
@@ -83,7 +93,10 @@ impl World {
     /// Light that leaves the end of a ray towards its start.
     pub(crate) fn light(&self, end: Option<&Point>, direction: Vec3) -> Vec3 {
         match end {
-            None => self.sky.as_ref().map_or(Vec3::ZERO, |sky| sky.radiance(direction)),
+            None => {
+                let sky = self.sky.as_ref().map_or(Vec3::ZERO, |sky| sky.radiance(direction));
+                self.caps.iter().fold(sky, |sum, &lamp| sum + self.lamps[lamp].radiance(direction))
+            }
             Some(point) => {
                 let material = self.scene.material(point);
                 if !material.emits() || !(point.front || material.two_sided) {
