@@ -56,7 +56,8 @@ impl PowerTable {
             let pdf = share / (TAU * (1.0 - cosine));
             return Some(Proposal { direction: within(direction, cosine, [u, v]), pdf, distance: None, lamp: None });
         }
-        Some(Proposal { direction, pdf: share, distance: None, lamp: Some(lamp) })
+        // Not from the lamp's own place.
+        direction.is_finite().then_some(Proposal { direction, pdf: share, distance: None, lamp: Some(lamp) })
     }
 
     /// Density per solid angle of a direction that leads to a point of an emitter, or out of the scene if that is `None`.
