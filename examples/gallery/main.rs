@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use arguments::{Arguments, Task};
 use image::RgbImage;
-use render::{Daylight, Error, Image, Model, Sky, read_rgb, write_rgb};
+use render::{Daylight, Error, Illumination, Image, Lights, Model, Sky, read_rgb, write_rgb};
 use report::{Comparison, Effort, Picture};
 use scenes::Scene;
 
@@ -77,6 +77,10 @@ fn render_file(path: &Path, arguments: &Arguments) -> Result<(), Error> {
     }
     for line in contents.iter().take(if arguments.lists { contents.len() } else { 2 }) {
         println!("{line}");
+    }
+    match Lights::new(&model, Illumination::default()) {
+        Ok(lights) => println!("{}", lights.described()),
+        Err(error) => eprintln!("note: fanlight refuses its lights: {error}"),
     }
     if arguments.lists {
         return Ok(());

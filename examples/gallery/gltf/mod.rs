@@ -6,6 +6,8 @@
 //! bytes are, the outcome is a scene or an error of one line: nothing panics, calls itself as deep as the file says, or
 //! takes much more memory than the file has bytes.
 
+extern crate alloc;
+
 mod accessor;
 mod base64;
 mod container;

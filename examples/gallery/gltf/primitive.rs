@@ -73,7 +73,8 @@ pub(super) fn read(
         _ => vec![],
     };
     let colors = colors(data, primitive, wanted, positions.len(), notes)?;
-    let mesh = Mesh { positions, uvs, emission_uvs, colors, indices, material: wanted.material };
+    let mesh =
+        Mesh { positions, uvs, emission_uvs, colors, indices, material: wanted.material, bulb: None, copies: None };
     Ok(Some((mesh, is_skinned)))
 }
 

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use glam::{Mat3, Mat4, Vec3};
+use glam::{Affine3A, Mat3, Mat4, Vec3};
 
+use super::alloc::sync::Arc;
 use super::contents::{self, Uses, starts_with};
 use super::data::{Data, Limits};
 use super::document::{Document, member};
@@ -16,7 +17,7 @@ use super::primitive::{self, Wanted};
 use super::surface::{Map, Reading, Surface};
 use super::texture::Mapping;
 use super::{container, extensions, lamps, skin};
-use crate::render::{Camera, Error, Material, Mesh, Model, Sky};
+use crate::render::{Camera, Copies, Error, Material, Mesh, Model, Sky};
 
 /// Longest side of a scene: what is further than a thousand kilometers is a mistake in its units.
 const LARGEST: f32 = 1e6;
@@ -55,6 +56,7 @@ pub(crate) fn read(
         hierarchy,
         images: Images::default(),
         textures: HashMap::new(),
+        objects: HashMap::new(),
         size: 0,
         mappings: vec![None; document.materials.len() + 1],
         model,
@@ -76,6 +78,8 @@ struct Reader<'a> {
     images: Images,
     /// The model's numbers of images that are textures as they are, by the texture.
     textures: HashMap<usize, usize>,
+    /// Primitives that emit light or may let it in, in their own coordinates, by mesh and number.
+    objects: HashMap<(usize, usize), Arc<Mesh>>,
     /// Triangles or vertices so far.
     size: usize,
     /// Of each material that is in use; the last one is that of meshes without a material.
@@ -93,7 +97,7 @@ impl Reader<'_> {
         }
         let [low, high] = self.check()?;
         self.place_camera(low, high)?;
-        self.add_lamps((high - low).length())?;
+        self.add_lamps()?;
         self.conclude();
         Ok(())
     }
@@ -136,9 +140,21 @@ impl Reader<'_> {
                 uses.meshes.push(called.clone());
             }
             self.note_names(material, index, mesh_index);
-            let mesh = placed(&local, places);
+            let mut mesh = placed(&local, places);
             if let Some(corner) = mesh.positions.iter().find(|corner| !corner.is_finite()) {
                 return Err(within(format!("a vertex is at {corner}").into()));
+            }
+            let of_light = &self.model.materials[of_model];
+            if !is_skinned && (of_light.emits() || self.model.is_portal(&mesh)) {
+                let object = match self.objects.get(&(mesh_index, number)) {
+                    Some(object) if node.weights.is_empty() => object.clone(),
+                    _ => Arc::new(local),
+                };
+                if node.weights.is_empty() {
+                    self.objects.insert((mesh_index, number), object.clone());
+                }
+                let places = places.iter().map(|place| Affine3A::from_mat4(*place)).collect();
+                mesh.copies = Some(Copies { object, places });
             }
             self.model.add(mesh);
         }
@@ -250,7 +266,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn add_lamps(&mut self, diagonal: f32) -> Result<(), Error> {
+    fn add_lamps(&mut self) -> Result<(), Error> {
         for index in self.hierarchy.visible.clone() {
             let node = &self.document.nodes[index];
             let within = |error: Error| Error::from(format!("{}: {error}", self.document.node(index)));
@@ -259,9 +275,9 @@ impl Reader<'_> {
             if !global.is_finite() || global.w_axis.truncate().abs().max_element() > LARGEST {
                 return Err(within(format!("{called} is at {}", global.w_axis.truncate()).into()));
             }
-            lamps::add(&mut self.model, &lamp, &called, &global, diagonal, &mut self.notes)
+            lamps::add(&mut self.model, &lamp, &called, &global, &mut self.notes)
                 .map_err(|error| within(format!("{called}: {error}").into()))?;
-            self.contents.push(format!("{called} of {}: {}", self.document.node(index), lamp.kind.escape_debug()));
+            self.contents.push(format!("{called} of {}: {}", self.document.node(index), lamps::described(&lamp)));
         }
         Ok(())
     }
@@ -281,18 +297,22 @@ impl Reader<'_> {
                 materials.len(),
                 images.len()
             ),
-            format!("triangles: {triangles}, portal meshes: {portals}, emitting meshes: {lights}"),
+            format!(
+                "triangles: {triangles}, portal meshes: {portals}, emitting meshes: {lights}, lights without a surface: {}",
+                self.model.lamps.len()
+            ),
         ];
         lines.append(&mut self.contents);
         lines.append(&mut contents::list(self.document, &self.model, &self.uses));
         lines.extend((0..images.len()).map(|i| format!("{}: {}", self.document.image(i), self.images.state(i))));
         self.contents = lines;
+        let lights = lights + self.model.lamps.len();
         if lights + portals == 0 && self.model.sky.is_none() {
             self.notes.add("nothing emits light, and there is no environment: all is black".to_owned());
         } else if lights + portals == 0 {
             let prefix = &self.model.portal_prefix;
             self.notes.add(format!(
-                "no material emits light, and none that lets light through has a name that starts with `{prefix}`: \
+                "there are no lamps, no material emits light, and none that lets light through has a name that starts with `{prefix}`: \
                  there is nothing to gain"
             ));
         }

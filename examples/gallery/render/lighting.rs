@@ -3,14 +3,22 @@
 
 pub(crate) use fanlight::{Filter, Illumination, Wrap};
 
-use fanlight::{Emission, Hit, LightSampler, Mesh, MeshId, PointSampler, RaySegment, ShadingPoint, Sides, TriangleId};
+use fanlight::{
+    DistantLight, Emission, LightSample, LightSampler, LightSamplerBuilder, Mesh, PointLight, PointSampler, ProfileId,
+    ProfileLight, RaySegment, SampledLight, ShadingPoint, Sides, SphereLight, SpotLight,
+};
 use glam::Vec3;
 
 use super::Error;
+use super::alloc::collections::{BTreeMap, BTreeSet};
+use super::alloc::sync::Arc;
 use super::bsdf::Bsdf;
+use super::lamp::{Diagram, Lamp, LampKind};
 use super::material::{Lobe, Material};
 use super::model::Model;
 use super::scene::Point;
+use super::sky::LUMINANCE;
+use super::sources::{Meshes, Passed, Sources};
 use super::weights::{clear, colored, emission, environment};
 
 /// A direction worth tracing.
@@ -20,15 +28,16 @@ pub(crate) struct Proposal {
     pub(crate) pdf: f32,
     /// How far away the point is that alone the density is for; `None` if it is for all along the direction.
     pub(crate) distance: Option<f32>,
+    /// Number of the lamp that was chosen, if it is one. No ray finds it by chance, and the density is the probability of
+    /// that choice.
+    pub(crate) lamp: Option<usize>,
 }
 
 /// The emitters, and the sky with the portals that it is seen through.
 pub(crate) struct Lights {
     sampler: LightSampler,
-    /// What the sampler calls the model's triangles.
-    ids: Vec<Option<TriangleId>>,
-    /// Meshes below this number are emitters, the others portals.
-    emitters: u32,
+    sources: Sources,
+    passed: Passed,
 }
 
 impl Lights {
@@ -43,36 +52,76 @@ impl Lights {
         illumination: Illumination,
         factor: impl Fn(usize) -> f32,
     ) -> Result<Self, Error> {
-        let emits = |mesh: &&super::mesh::Mesh| model.materials[mesh.material].emits();
-        let emitters: Vec<_> = model.meshes.iter().filter(emits).collect();
+        let material = |mesh: &super::mesh::Mesh| &model.materials[mesh.material];
+        let firsts =
+            model.meshes.iter().scan(0, |next, mesh| Some(core::mem::replace(next, *next + mesh.indices.len())));
+        let emitters: Vec<_> = model.meshes.iter().zip(firsts).filter(|(mesh, _)| material(mesh).emits()).collect();
         let flagged = model.meshes.iter().filter(|mesh| model.is_portal(mesh));
-        let portals: Vec<_> = flagged.filter(|mesh| model.materials[mesh.material].has_holes()).collect();
+        let portals: Vec<_> = flagged.filter(|mesh| material(mesh).has_holes()).collect();
 
-        let emission: Vec<_> = emitters.iter().map(|mesh| emission(model, &model.materials[mesh.material])).collect();
-        let transmission: Vec<_> = (portals.iter().enumerate())
-            .map(|(i, mesh)| clear(model, &model.materials[mesh.material]).times(factor(i)))
-            .collect();
+        let mut meshes = Meshes::of(model);
+        // Once for each material.
+        let used: BTreeSet<_> = emitters.iter().map(|(mesh, _)| mesh.material).collect();
+        let emission: BTreeMap<_, _> =
+            used.into_iter().map(|number| (number, emission(model, &model.materials[number]))).collect();
+        let factor_of = |(i, mesh): (usize, &&super::mesh::Mesh)| match meshes.shared(mesh) {
+            None => clear(model, material(mesh)).times(factor(i)),
+            Some(_) => clear(model, material(mesh)),
+        };
+        let transmission: Vec<_> = portals.iter().enumerate().map(factor_of).collect();
         let mut builder = LightSampler::builder().illumination(illumination).environment(environment(model)?);
-        for (mesh, weight) in emitters.iter().zip(&emission) {
-            let mesh_light = Mesh::emitter(&mesh.positions, &mesh.indices).uvs(mesh.emission_uvs());
-            weight.add(&mut builder, mesh_light.sides(sides(&model.materials[mesh.material])))?;
+        // Their numbers are those of the model.
+        let mut profiles = BTreeMap::new();
+        for lamp in &model.lamps {
+            add_lamp(&mut builder, &mut profiles, lamp)?;
         }
-        for (mesh, weight) in portals.iter().zip(&transmission) {
-            let portal = Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs);
-            weight.add(&mut builder, portal.sides(sides(&model.materials[mesh.material])))?;
+        let mut emitted = BTreeMap::new();
+        for (&number, weight) in &emission {
+            emitted.insert(number, weight.weight(&mut builder)?);
         }
-        let mut next = (0..).map(MeshId::from_index);
-        let ids = model.meshes.iter().flat_map(|mesh| {
-            let number = emits(&mesh).then(|| next.next()).flatten();
-            (0..mesh.indices.len() as u32).map(move |triangle| number.map(|mesh| TriangleId::new(mesh, triangle)))
-        });
-        Ok(Self { ids: ids.collect(), emitters: emitters.len() as u32, sampler: builder.build()? })
+        for (mesh, first) in emitters {
+            if let Some((center, radius)) = mesh.bulb {
+                builder.add_light(SphereLight::new(center, radius, LUMINANCE.dot(material(mesh).emission)))?;
+                continue;
+            }
+            let (sides, weight) = (sides(material(mesh)), emitted[&mesh.material]);
+            meshes.add_emitter(&mut builder, mesh, first, &|mesh| {
+                Mesh::emitter(&mesh.positions, &mesh.indices).uvs(mesh.emission_uvs()).sides(sides).weight(weight)
+            })?;
+        }
+        for (i, (mesh, weight)) in portals.into_iter().zip(&transmission).enumerate() {
+            let (sides, weight) = (sides(material(mesh)), weight.weight(&mut builder)?);
+            meshes.add_portal(&mut builder, mesh, factor(i), &|mesh| {
+                Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(sides).weight(weight)
+            })?;
+        }
+        let (sources, passed) = meshes.finish();
+        Ok(Self { sources, passed, sampler: builder.build()? })
+    }
+
+    /// What was passed in, and the memory that it takes.
+    pub(crate) fn described(&self) -> String {
+        let Passed { meshes, objects, instances } = self.passed;
+        let bytes = self.sampler.bytes();
+        let kilobytes = |bytes: usize| bytes as f64 / 1e3;
+        format!(
+            "fanlight: {} lights; {meshes} meshes, and {instances} instances of {objects} more; {:.1} kB, of which {:.1} kB \
+             are of the environment",
+            self.sampler.light_count(),
+            kilobytes(bytes.total()),
+            kilobytes(bytes.environment)
+        )
+    }
+
+    /// Whether rays of light start anywhere but at lamps.
+    pub(crate) const fn have_surfaces(&self) -> bool {
+        self.passed.meshes + self.passed.instances > 0
     }
 
     /// A direction to the sky, bright parts more often than dark ones.
     pub(crate) fn sample_environment(&self, u: [f32; 2]) -> Option<Proposal> {
         let sample = self.sampler.environment().sample(u)?;
-        Some(Proposal { direction: sample.direction, pdf: sample.pdf, distance: None })
+        Some(Proposal { direction: sample.direction, pdf: sample.pdf, distance: None, lamp: None })
     }
 
     /// Density per solid angle of a direction under [`sample_environment`](Self::sample_environment).
@@ -111,7 +160,7 @@ impl Lights {
     /// A portal's number and a direction through it, as drawn for a point of a surface.
     pub(crate) fn sample_portal(&self, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<(usize, Vec3)> {
         let sample = self.sampler.at(&ShadingPoint::surface(position, normal)).sample(u)?;
-        let portal = sample.hit()?.triangle.mesh.index().checked_sub(self.emitters)?;
+        let portal = sample.hit()?.triangle.mesh.index().checked_sub(self.sources.emitting_meshes())?;
         Some((portal as usize, sample.direction))
     }
 
@@ -127,10 +176,9 @@ pub(crate) struct LightsAt<'a>(PointSampler<'a>);
 impl LightsAt<'_> {
     /// A direction to a light, by what comes from there and counts at the point.
     pub(crate) fn sample(&self, u: [f32; 3]) -> Option<Proposal> {
-        let sample = self.0.sample(u)?;
         // Not `sample.pdf`, the density of this one point: were there another portal behind this one, the same
         // direction could have been found through that.
-        Some(Proposal { direction: sample.direction, pdf: self.0.pdf_sample_direction(&sample), distance: None })
+        self.0.sample(u).map(|sample| proposal(&sample, self.0.pdf_sample_direction(&sample)))
     }
 
     /// Density per solid angle of a direction under [`sample`](Self::sample).
@@ -140,8 +188,16 @@ impl LightsAt<'_> {
 
     /// A direction with the density of the one point that was drawn: what to compare with, not what to use.
     pub(crate) fn sample_single(&self, u: [f32; 3]) -> Option<Proposal> {
-        self.0.sample(u).map(|sample| Proposal { direction: sample.direction, pdf: sample.pdf, distance: None })
+        self.0.sample(u).map(|sample| proposal(&sample, sample.pdf))
     }
+}
+
+fn proposal(sample: &LightSample, pdf: f32) -> Proposal {
+    let lamp = match sample.light {
+        SampledLight::Punctual(id) => Some(id.index() as usize),
+        _ => None,
+    };
+    Proposal { direction: sample.direction, pdf, distance: None, lamp }
 }
 
 /// A ray of light.
@@ -163,7 +219,7 @@ impl Outgoing<'_> {
     /// A ray from an emitter or through a portal, by the light that it brings.
     pub(crate) fn sample(&self, u: [f32; 5]) -> Option<LightRay> {
         let ray = self.emission.sample(u)?;
-        let emitted = ray.hit()?.triangle.mesh.index() < self.lights.emitters;
+        let emitted = self.lights.sources.emits(&ray.hit()?);
         Some(LightRay { origin: ray.position, direction: ray.direction, emitted })
     }
 
@@ -172,8 +228,7 @@ impl Outgoing<'_> {
     pub(crate) fn pdf(&self, position: Vec3, towards: Vec3, from: Option<&Point>) -> f32 {
         match from {
             None => self.emission.pdf_ray(position, towards),
-            Some(Point { triangle, barycentrics, .. }) => self.lights.ids[*triangle]
-                .map_or(0.0, |triangle| self.emission.pdf(&Hit::new(triangle, *barycentrics), -towards)),
+            Some(point) => self.lights.sources.hit(point).map_or(0.0, |hit| self.emission.pdf(&hit, -towards)),
         }
     }
 }
@@ -194,7 +249,9 @@ impl Guide {
         let weights: Vec<_> = papers.iter().map(|mesh| colored(model, &model.materials[mesh.material])).collect();
         let mut builder = LightSampler::builder();
         for (mesh, weight) in papers.iter().zip(&weights) {
-            weight.add(&mut builder, Mesh::emitter(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(Sides::Two))?;
+            let paper = Mesh::emitter(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(Sides::Two);
+            let weight = weight.weight(&mut builder)?;
+            builder.add_mesh(&paper.weight(weight))?;
         }
         if papers.is_empty() { Ok(None) } else { Ok(Some(Self(builder.build()?))) }
     }
@@ -203,6 +260,34 @@ impl Guide {
     pub(crate) fn at(&self, position: Vec3, bsdf: &Bsdf) -> LightsAt<'_> {
         LightsAt(self.0.at(&surface(position, bsdf)))
     }
+}
+
+/// Passes in a lamp, by its luminance; a diagram that several have only once.
+fn add_lamp(
+    builder: &mut LightSamplerBuilder<'_>,
+    profiles: &mut BTreeMap<*const Diagram, ProfileId>,
+    lamp: &Lamp,
+) -> Result<(), Error> {
+    let strength = LUMINANCE.dot(lamp.strength);
+    match &lamp.kind {
+        LampKind::Point(position) => builder.add_light(PointLight::new(*position, strength))?,
+        LampKind::Spot(position, axis, angles) => {
+            builder.add_light(SpotLight::new(*position, *axis, strength, *angles))?
+        }
+        LampKind::Luminaire(position, diagram) => {
+            let key = Arc::as_ptr(diagram);
+            let profile = match profiles.get(&key) {
+                Some(&profile) => profile,
+                None => builder.add_profile(&diagram.profile())?,
+            };
+            profiles.insert(key, profile);
+            builder.add_light(ProfileLight::new(*position, diagram.axis, profile, strength).facing(diagram.zero))?
+        }
+        LampKind::Distant(axis, radius) => {
+            builder.add_light(DistantLight::new(*axis, strength).angular_radius(*radius))?
+        }
+    };
+    Ok(())
 }
 
 const fn sides(material: &Material) -> Sides {

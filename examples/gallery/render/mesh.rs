@@ -2,7 +2,9 @@
 
 use core::f32::consts::{PI, TAU};
 
-use glam::{Vec2, Vec3, vec2};
+use glam::{Affine3A, Vec2, Vec3, vec2};
+
+use super::alloc::sync::Arc;
 
 /// Triangles of one material.
 #[derive(Clone, Debug, Default)]
@@ -16,12 +18,39 @@ pub(crate) struct Mesh {
     pub(crate) colors: Vec<Vec3>,
     pub(crate) indices: Vec<[u32; 3]>,
     pub(crate) material: usize,
+    /// Center and radius of the sphere that is passed to `fanlight` in place of these triangles, if they are a bulb.
+    pub(crate) bulb: Option<(Vec3, f32)>,
+    /// What all of these triangles are copies of, if they are.
+    pub(crate) copies: Option<Copies>,
+}
+
+/// A mesh that stands in several places, one after the other in the mesh that holds its copies.
+#[derive(Clone, Debug)]
+pub(crate) struct Copies {
+    /// The same for all meshes that hold copies of it.
+    pub(crate) object: Arc<Mesh>,
+    /// From its coordinates to the world.
+    pub(crate) places: Vec<Affine3A>,
 }
 
 impl Mesh {
     /// Nothing yet, of some material.
     pub(crate) fn of(material: usize) -> Self {
         Self { material, ..Self::default() }
+    }
+
+    /// The copy of that number, alone.
+    pub(crate) fn copy(&self, number: usize) -> Self {
+        let Some(Copies { object, .. }) = &self.copies else { return self.clone() };
+        let (vertices, triangles) = (object.positions.len(), object.indices.len());
+        let first = number * vertices;
+        let indices = self.indices[number * triangles..][..triangles].iter();
+        Self {
+            positions: self.positions[first..][..vertices].to_vec(),
+            indices: indices.map(|corners| corners.map(|i| i - first as u32)).collect(),
+            copies: None,
+            ..Self::clone(object)
+        }
     }
 
     /// Where the emission's image is read, one a vertex.
@@ -55,6 +84,11 @@ impl Mesh {
             center - radius * Vec3::new(-sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
         });
         self
+    }
+
+    /// Makes a bulb: a sphere that has to be the whole mesh.
+    pub(crate) fn bulb(self, center: Vec3, radius: f32, rings: u32) -> Self {
+        Self { bulb: Some((center, radius)), ..self.sphere(center, radius, rings) }
     }
 
     /// Adds a polygon with holes that lies in the plane of `u` and `v` through `origin`; coordinates in that plane.

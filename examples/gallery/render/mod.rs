@@ -1,9 +1,9 @@
 //! A small path tracer for triangle meshes.
 //!
-//! What it shares with [`lighting`] and [`weights`], the only files that call `fanlight` for it, is what any renderer has: a scene to
-//! cast rays into ([`scene`]), materials ([`material`], [`bsdf`]), the radiance of the sky ([`world`]), and an
-//! integrator that asks for directions and for densities of directions ([`path`], and [`photon`] for light that is
-//! traced from its source).
+//! What it shares with [`lighting`], [`sources`] and [`weights`], the only files that call `fanlight` for it, is what any
+//! renderer has: a scene to cast rays into ([`scene`]), materials ([`material`], [`bsdf`]), lights without a surface
+//! ([`lamp`]), the radiance of the sky ([`world`]), and an integrator that asks for directions and for densities of
+//! directions ([`path`], and [`photon`] for light that is traced from its source).
 
 extern crate alloc;
 
@@ -16,12 +16,14 @@ mod daylight;
 mod file;
 #[path = "../../room/render/film.rs"]
 mod film;
+mod lamp;
 mod lighting;
 mod material;
 mod mesh;
 mod model;
 mod path;
 mod photon;
+mod power_table;
 #[path = "../../room/render/progressive.rs"]
 mod progressive;
 mod published;
@@ -29,6 +31,7 @@ mod random;
 mod scene;
 #[path = "../../room/render/sky.rs"]
 mod sky;
+mod sources;
 mod technique;
 mod texel_table;
 mod vertex;
@@ -40,9 +43,10 @@ pub(crate) use camera::Camera;
 pub(crate) use daylight::Daylight;
 pub(crate) use file::{read_rgb, write_rgb};
 pub(crate) use film::{Film, Image, Reference};
+pub(crate) use lamp::{Diagram, Lamp, LampKind};
 pub(crate) use lighting::{Filter, Illumination, Lights, Wrap};
 pub(crate) use material::{Lobe, Material};
-pub(crate) use mesh::Mesh;
+pub(crate) use mesh::{Copies, Mesh};
 pub(crate) use model::{Fog, Model};
 pub(crate) use path::PathTracer;
 pub(crate) use progressive::{Budget, Progressive};

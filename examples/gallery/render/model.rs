@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::bitmap::Bitmap;
 use super::camera::Camera;
+use super::lamp::Lamp;
 use super::material::Material;
 use super::mesh::Mesh;
 use super::sky::Sky;
@@ -23,6 +24,8 @@ pub(crate) struct Fog {
 #[derive(Clone)]
 pub(crate) struct Model {
     pub(crate) meshes: Vec<Mesh>,
+    /// Lights without a surface.
+    pub(crate) lamps: Vec<Lamp>,
     pub(crate) materials: Vec<Material>,
     pub(crate) bitmaps: Vec<Bitmap>,
     pub(crate) camera: Camera,
@@ -40,6 +43,7 @@ impl Model {
     pub(crate) fn new(camera: Camera, sky: Option<Sky>) -> Self {
         Self {
             meshes: Vec::new(),
+            lamps: Vec::new(),
             materials: Vec::new(),
             bitmaps: Vec::new(),
             camera,
@@ -65,6 +69,13 @@ impl Model {
     /// Adds a mesh.
     pub(crate) fn add(&mut self, mesh: Mesh) {
         self.meshes.push(mesh);
+    }
+
+    /// Distance from the lowest corner to the highest one; 1 if there is nothing.
+    pub(crate) fn diagonal(&self) -> f32 {
+        let corners = || self.meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
+        let (low, high) = (corners().reduce(Vec3::min), corners().reduce(Vec3::max));
+        low.zip(high).map_or(1.0, |(low, high)| (high - low).length())
     }
 
     /// Whether a mesh was flagged as a portal by the name of its material, in capitals or not.

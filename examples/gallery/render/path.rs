@@ -114,12 +114,15 @@ impl<'a> PathTracer<'a> {
 
     /// Direct light along a direction that the environment or the lights proposed.
     fn along(&self, x: &Vertex<'_>, proposal: &Proposal, by_environment: bool) -> Vec3 {
-        let &Proposal { direction, pdf, distance } = proposal;
+        let &Proposal { direction, pdf, distance, lamp } = proposal;
         let value = x.value(direction);
         if value == Vec3::ZERO {
             return value;
         }
         let start = x.start(direction);
+        if let Some(lamp) = lamp {
+            return value * self.world.arriving_from_lamp(lamp, start) / pdf;
+        }
         let arrival = if by_environment {
             self.world.arriving_from_sky(start, direction)
         } else {
@@ -180,8 +183,8 @@ impl<'a> PathTracer<'a> {
             return lights_pdf;
         }
         let environment_pdf = match from {
-            None => self.techniques.lights.environment_pdf(direction),
-            Some(_) => 0.0,
+            None if self.world.has_sky() => self.techniques.lights.environment_pdf(direction),
+            _ => 0.0,
         };
         let photon_pdf = match (&self.photons, x.arrival, &x.place) {
             (Some(photons), Some(arrival), Place::Surface(point, _)) => photons.pdf(point, direction, from) / arrival,

@@ -109,11 +109,8 @@ impl Scene {
         }
         let mut build_time = core::time::Duration::ZERO;
         let bvh = build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), &mut build_time);
-        let corners = || model.meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
-        let (low, high) = (corners().reduce(Vec3::min), corners().reduce(Vec3::max));
-        let diagonal = low.zip(high).map_or(1.0, |(low, high)| (high - low).length());
         let (materials, bitmaps) = (model.materials.clone(), model.bitmaps.clone());
-        Self { bvh, triangles, uvs, surfaces, layers, materials, bitmaps, diagonal }
+        Self { bvh, triangles, uvs, surfaces, layers, materials, bitmaps, diagonal: model.diagonal() }
     }
 
     /// How far from surfaces rays start and end.

@@ -6,6 +6,7 @@ use super::Error;
 use super::bsdf::Bsdf;
 use super::lighting::{Guide, Illumination, Lights, LightsAt, Proposal};
 use super::model::Model;
+use super::power_table::PowerTable;
 use super::published::Published;
 use super::scene::Point;
 use super::texel_table::TexelTable;
@@ -21,6 +22,8 @@ pub(crate) enum LightChoice {
     Single,
     /// From one table for the whole scene, emitters only.
     Table(TexelTable),
+    /// By power among emitters and lamps.
+    Power(PowerTable),
     /// As it was published, emitters only.
     Published(Published),
 }
@@ -37,20 +40,27 @@ pub(crate) struct Techniques {
 }
 
 impl Techniques {
-    /// What a path tracer has that knows no portals: the sky's bright parts, and emitters by area and radiance.
+    /// What a path tracer has that knows no portals: the sky's bright parts, emitters by area and radiance, and lamps by
+    /// power.
     pub(crate) fn without(model: &Model) -> Result<Self, Error> {
-        let table = TexelTable::areas(model);
-        let choice = if table.is_empty() { LightChoice::None } else { LightChoice::Table(table) };
+        let choice = if model.lamps.is_empty() {
+            let table = TexelTable::areas(model);
+            if table.is_empty() { LightChoice::None } else { LightChoice::Table(table) }
+        } else {
+            PowerTable::new(model).map_or(LightChoice::None, LightChoice::Power)
+        };
         let lights = Lights::new(model, Illumination::default())?;
         Ok(Self { lights, guide: None, choice, vertices: u32::MAX, photons: false })
     }
 
     /// The same with `fanlight`: at the point that the camera sees by choosing points on lights, at those behind it
-    /// by rays of light that are traced from where they start.
+    /// by rays of light that are traced from where they start. Lamps are chosen at all points, as no ray is traced from them.
     pub(crate) fn with(model: &Model) -> Result<Self, Error> {
         let lights = Lights::new(model, Illumination::default())?;
         let guide = Guide::new(model)?;
-        Ok(Self { lights, guide, choice: LightChoice::Fanlight, vertices: 1, photons: true })
+        let photons = lights.have_surfaces();
+        let vertices = if model.lamps.is_empty() { 1 } else { u32::MAX };
+        Ok(Self { lights, guide, choice: LightChoice::Fanlight, vertices, photons })
     }
 
     /// The same with another way to choose points on lights.
@@ -71,6 +81,7 @@ impl Techniques {
             }
             LightChoice::Single => ChoiceAt::Single(self.lights.at_surface(point.position, bsdf)),
             LightChoice::Table(table) => ChoiceAt::Table(table, point.position),
+            LightChoice::Power(table) => ChoiceAt::Power(table, point.position),
             LightChoice::Published(lights) => {
                 ChoiceAt::Published(lights, ShadingPoint::surface(point.position, bsdf.normal()))
             }
@@ -83,6 +94,7 @@ impl Techniques {
         match &self.choice {
             LightChoice::Fanlight => ChoiceAt::Fanlight(self.lights.at_volume(position)),
             LightChoice::Table(table) => ChoiceAt::Table(table, position),
+            LightChoice::Power(table) => ChoiceAt::Power(table, position),
             _ => ChoiceAt::None,
         }
     }
@@ -115,6 +127,7 @@ pub(crate) enum ChoiceAt<'a> {
     Fanlight(LightsAt<'a>),
     Single(LightsAt<'a>),
     Table(&'a TexelTable, glam::Vec3),
+    Power(&'a PowerTable, glam::Vec3),
     Published(&'a Published, ShadingPoint),
 }
 
@@ -126,6 +139,7 @@ impl ChoiceAt<'_> {
             Self::Fanlight(lights) => lights.sample(u),
             Self::Single(lights) => lights.sample_single(u),
             Self::Table(table, position) => table.sample(*position, u),
+            Self::Power(table, position) => table.sample(*position, u),
             Self::Published(lights, x) => lights.sample(x, u),
         }
     }
@@ -136,6 +150,7 @@ impl ChoiceAt<'_> {
         match self {
             Self::None | Self::Single(_) => 0.0,
             Self::Fanlight(lights) => lights.pdf(direction),
+            Self::Power(table, _) => table.pdf(direction, from),
             Self::Table(table, _) => from.map_or(0.0, |point| table.pdf(direction, point)),
             Self::Published(lights, x) => from.map_or(0.0, |point| lights.pdf(x, direction, point)),
         }

@@ -53,6 +53,11 @@ impl TexelTable {
         self.parts.is_empty()
     }
 
+    /// Area of all emitters times their radiance.
+    pub(crate) fn total(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
     fn new(model: &Model, by_texel: bool) -> Self {
         let mut table = Self { parts: vec![], cumulative: vec![], triangles: vec![], densities: vec![] };
         let mut total = 0.0;
@@ -107,7 +112,12 @@ impl TexelTable {
         let distance2 = step.length_squared();
         let direction = step / distance2.sqrt();
         let pdf = pdf_area as f32 * distance2 / normal.dot(direction).abs();
-        (pdf.is_finite() && pdf > 0.0).then_some(Proposal { direction, pdf, distance: Some(distance2.sqrt()) })
+        (pdf.is_finite() && pdf > 0.0).then_some(Proposal {
+            direction,
+            pdf,
+            distance: Some(distance2.sqrt()),
+            lamp: None,
+        })
     }
 
     /// Density per solid angle of a direction that leads to a point of an emitter.

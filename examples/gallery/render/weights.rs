@@ -1,6 +1,6 @@
 //! What guides `fanlight`: weights of meshes, and the sky.
 
-use fanlight::{Environment, EnvironmentImage, Filter, LightSamplerBuilder, Mesh, Texture, Weight};
+use fanlight::{Environment, EnvironmentImage, Filter, LightSamplerBuilder, Texture, Weight};
 
 use super::Error;
 use super::bitmap::Bitmap;
@@ -38,16 +38,15 @@ impl<'a> Weights<'a> {
         self
     }
 
-    pub(super) fn add<'b>(&'b self, builder: &mut LightSamplerBuilder<'b>, mesh: Mesh<'_>) -> Result<(), Error> {
-        let weight = match self.bitmap {
+    /// The weight of meshes, after the texels have been passed in.
+    pub(super) fn weight<'b>(&'b self, builder: &mut LightSamplerBuilder<'b>) -> Result<Weight, Error> {
+        Ok(match self.bitmap {
             None => Weight::Constant(self.constant),
             Some(Bitmap { width, height, filter, wrap, .. }) => {
                 let texture = Texture::new(*width, *height, &self.texels)?.filter(*filter).wrap(wrap[0], wrap[1]);
                 Weight::Texture(builder.add_texture(texture))
             }
-        };
-        builder.add_mesh(&mesh.weight(weight))?;
-        Ok(())
+        })
     }
 }
 

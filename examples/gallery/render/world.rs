@@ -5,6 +5,7 @@ use super::alloc::sync::Arc;
 use glam::Vec3;
 
 use super::bsdf::Bsdf;
+use super::lamp::Lamp;
 use super::material::Material;
 use super::model::{Fog, Model};
 use super::scene::{Point, Scene};
@@ -15,6 +16,9 @@ pub(crate) struct World {
     pub(crate) scene: Scene,
     sky: Option<Arc<Sky>>,
     emits: bool,
+    lamps: Vec<Lamp>,
+    /// Those of them that rays find by chance.
+    caps: Vec<usize>,
     pub(crate) fog: Option<Fog>,
 }
 
@@ -29,7 +33,15 @@ impl World {
     /// Copies the surfaces of a model.
     pub(crate) fn new(model: &Model) -> Self {
         let emits = model.materials.iter().any(Material::emits);
-        Self { scene: Scene::new(model), sky: model.sky.clone(), emits, fog: model.fog }
+        let caps = (0..model.lamps.len()).filter(|&lamp| model.lamps[lamp].cap().is_some()).collect();
+        Self {
+            scene: Scene::new(model),
+            sky: model.sky.clone(),
+            emits,
+            lamps: model.lamps.clone(),
+            caps,
+            fog: model.fog,
+        }
     }
 
     /// The first solid surface along a ray, and what passes the panes and the fog before it.
@@ -66,10 +78,25 @@ impl World {
         Arrival { radiance, from: None }
     }
 
+    /// Irradiance by the lamp of that number on what faces it: zero if anything solid is in the way.
+    pub(crate) fn arriving_from_lamp(&self, lamp: usize, at: Vec3) -> Vec3 {
+        let Some(lamp) = self.lamps.get(lamp) else { return Vec3::ZERO };
+        let irradiance = lamp.irradiance(at);
+        if irradiance == Vec3::ZERO {
+            return irradiance;
+        }
+        let (direction, distance) = lamp.towards(at);
+        let passed = self.scene.passes(at, direction, distance);
+        if passed == Vec3::ZERO { passed } else { irradiance * passed * self.passes_fog(at, direction, distance) }
+    }
+
     /// Light that leaves the end of a ray towards its start.
     pub(crate) fn light(&self, end: Option<&Point>, direction: Vec3) -> Vec3 {
         match end {
-            None => self.sky.as_ref().map_or(Vec3::ZERO, |sky| sky.radiance(direction)),
+            None => {
+                let sky = self.sky.as_ref().map_or(Vec3::ZERO, |sky| sky.radiance(direction));
+                self.caps.iter().fold(sky, |sum, &lamp| sum + self.lamps[lamp].radiance(direction))
+            }
             Some(point) => {
                 let material = self.scene.material(point);
                 if !material.emits() || !(point.front || material.two_sided) {

@@ -1,5 +1,7 @@
 //! The built-in scenes. Lengths are metres, y is up, and the sun stands towards -x.
 
+extern crate alloc;
+
 mod car;
 mod facade;
 mod fog;
@@ -11,12 +13,14 @@ mod nested;
 mod pinhole;
 mod room;
 mod shapes;
+mod street;
 
 pub(crate) use facade::{facade, overcast_facade};
 pub(crate) use glyphs::is_ink;
 pub(crate) use letters::letters;
 pub(crate) use neon::neon;
 pub(crate) use nested::nested;
+pub(crate) use street::foggy_street;
 
 use crate::render::Model;
 
@@ -33,7 +37,7 @@ pub(crate) struct Scene {
 }
 
 /// All scenes, in the order of the contact sheet.
-pub(crate) const ALL: [Scene; 9] = [
+pub(crate) const ALL: [Scene; 10] = [
     Scene { name: "room", model: room::room, bounces: &[1, 5], detail: [0.72, 0.8] },
     Scene { name: "car", model: car::car, bounces: &[1, 5], detail: [0.5, 0.62] },
     Scene { name: "lantern", model: lantern::lantern, bounces: &[4], detail: [0.3, 0.75] },
@@ -43,4 +47,5 @@ pub(crate) const ALL: [Scene; 9] = [
     Scene { name: "nested", model: nested, bounces: &[1], detail: [0.6, 0.7] },
     Scene { name: "neon", model: neon, bounces: &[1], detail: [0.35, 0.85] },
     Scene { name: "fog", model: fog::fog, bounces: &[2], detail: [0.5, 0.5] },
+    Scene { name: "street", model: street::street, bounces: &[1, 3], detail: [0.35, 0.75] },
 ];

@@ -5,6 +5,7 @@ mod facade;
 mod letters;
 mod neon;
 mod nested;
+mod street;
 
 use crate::render::{Error, Model, Techniques, World};
 use crate::report::{Comparison, Contestant, Effort, compare};
@@ -17,6 +18,7 @@ pub(crate) fn study(scene: &Scene, model: &Model, effort: Effort) -> Result<Comp
         "facade" => facade::study(model, effort),
         "nested" => nested::study(model, effort),
         "neon" => neon::study(model, effort),
+        "street" => street::study(model, scene.bounces, effort),
         name => without_and_with(name, model, scene.bounces, effort),
     }
 }

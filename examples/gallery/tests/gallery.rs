@@ -32,7 +32,18 @@ fn check(name: &str, bounces: u32, samples: [u32; 2], share: f64) {
 /// The same with techniques that the others are compared with.
 fn compare(name: &str, bounces: u32, samples: [u32; 2], share: f64, techniques: impl Fn(&render::Model) -> Techniques) {
     let scene = scenes::ALL.iter().find(|scene| scene.name == name).expect("a scene");
-    let mut model = (scene.model)();
+    compare_models(name, (scene.model)(), bounces, samples, share, techniques);
+}
+
+/// The same for a model that is not in the list.
+fn compare_models(
+    name: &str,
+    mut model: render::Model,
+    bounces: u32,
+    samples: [u32; 2],
+    share: f64,
+    techniques: impl Fn(&render::Model) -> Techniques,
+) {
     model.camera = model.camera.sized(SIZE);
     let world = World::new(&model);
     let without = techniques(&model);
@@ -72,6 +83,17 @@ fn neon() {
 #[test]
 fn fog() {
     check("fog", 3, [400, 40], 0.03);
+}
+
+#[test]
+fn street() {
+    check("street", 2, [1500, 150], 0.03);
+}
+
+#[test]
+fn street_in_fog() {
+    let without = |model: &render::Model| Techniques::without(model).expect("lights");
+    compare_models("fog", scenes::foggy_street(), 1, [600, 100], 0.05, without);
 }
 
 /// What the default is compared with is right, too.

@@ -3,7 +3,8 @@
 use glam::{Vec3, vec3};
 use serde_json::json;
 
-use super::{File, assert_near};
+use super::{File, assert_near, brightness, brightness_by};
+use crate::render::{Illumination, Image, Lights, Random, Sky, Techniques, World};
 
 #[test]
 fn instances() {
@@ -19,6 +20,76 @@ fn instances() {
         let middles: Vec<Vec3> = read.corners(0).iter().step_by(2).map(|[a, _, c]| (*a + *c) / 2.0).collect();
         assert_eq!(middles, [vec3(0.0, 2.0, 0.0), vec3(2.0, 2.0, 0.0), vec3(-2.0, 2.0, 0.0)]);
     }
+}
+
+/// Lamps turned, stretched and mirrored by two nodes, of which one has copies: passed in once, or as all their triangles.
+#[test]
+fn instances_of_emitters() {
+    let mut file = File::lamp();
+    let texture = file.texture(|x, y| [(30 * x) as u8, (30 * y) as u8, 255, 255]);
+    file.json["materials"][0]["emissiveTexture"] = json!({ "index": texture });
+    let places = file.floats("VEC3", &[0.0, 0.0, 0.0, 4.0, 0.0, 0.0, -3.0, -1.0, 1.0]);
+    let turns = file.floats("VEC4", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.3, 0.954, 0.2, 0.0, 0.0, 0.98]);
+    // The second one turns about, as it is mirrored.
+    let scales = file.floats("VEC3", &[1.0, 1.0, 1.0, 1.5, -1.0, 0.7, 0.5, 1.0, 0.5]);
+    let attributes = json!({ "TRANSLATION": places, "ROTATION": turns, "SCALE": scales });
+    file.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
+    file.push("nodes", json!({ "mesh": 0, "translation": [0, 1.5, 1], "scale": [-0.3, 1, 0.4] }));
+    file.json["scenes"][0]["nodes"] = json!([0, 1, 2, 3]);
+
+    let instanced = file.read().model;
+    let mut flat = instanced.clone();
+    flat.meshes.iter_mut().for_each(|mesh| mesh.copies = None);
+    let lights = [&instanced, &flat].map(|model| Lights::new(model, Illumination::default()).expect("lights"));
+    assert!(lights[0].described().contains("0 meshes, and 4 instances of 1 "), "{}", lights[0].described());
+    assert!(lights[1].described().contains("2 meshes, and 0 instances of 0 "), "{}", lights[1].described());
+
+    // Rays of light at the points where they end.
+    let world = World::new(&instanced);
+    let mut random = Random::new(1, 1);
+    let mut found = 0;
+    for _ in 0..2000 {
+        let Some(ray) = lights[0].outgoing().sample(random.take()) else { continue };
+        assert!(ray.emitted);
+        let start = ray.origin + 0.5 * ray.direction;
+        let Some(from) = world.trace(start, -ray.direction).1.filter(|from| from.distance < 0.51) else { continue };
+        let densities = lights.each_ref().map(|lights| lights.outgoing().pdf(start, -ray.direction, Some(&from)));
+        assert!(densities[1] > 0.0 && (densities[0] / densities[1] - 1.0).abs() < 0.01, "{densities:?}");
+        found += 1;
+    }
+    assert!(found > 1500, "{found}");
+    assert_near(brightness(&instanced), brightness(&flat), 0.01);
+    let without = Techniques::without(&flat).expect("lights");
+    assert_near(brightness_by(&flat, &without), brightness(&instanced), 0.03);
+}
+
+/// A place that flattens a mesh is none for an object.
+#[test]
+fn flattened_emitters() {
+    let mut file = File::lamp();
+    let scales = file.floats("VEC3", &[1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    file.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"] = json!({ "attributes": { "SCALE": scales } });
+    let lights = Lights::new(&file.read().model, Illumination::default()).expect("lights");
+    assert!(lights.described().contains("2 meshes, and 1 instances of 1 "), "{}", lights.described());
+}
+
+/// Windows next to each other.
+#[test]
+fn instances_of_portals() {
+    let mut file = File::lamp();
+    file.json["materials"][0] = json!({ "name": "window", "alphaMode": "BLEND",
+        "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0.1] } });
+    for x in [2, -2] {
+        let node = file.push("nodes", json!({ "mesh": 0, "translation": [x, 2, 0], "scale": [0.3, 1, 0.5] }));
+        file.json["scenes"][0]["nodes"].as_array_mut().expect("nodes").push(json!(node));
+    }
+    let mut instanced = file.read().model;
+    instanced.sky = Some(Sky::new(Image { pixels: vec![Vec3::ONE; 32 * 16], ..Image::black(32, 16) }).into());
+    let mut flat = instanced.clone();
+    flat.meshes.iter_mut().for_each(|mesh| mesh.copies = None);
+    let lights = Lights::new(&instanced, Illumination::default()).expect("lights");
+    assert!(lights.described().contains("0 meshes, and 3 instances of 1 "), "{}", lights.described());
+    assert_near(brightness(&instanced), brightness(&flat), 0.01);
 }
 
 #[test]

@@ -186,9 +186,13 @@ impl Read {
 
 /// Mean of the lower third of a picture.
 pub(super) fn brightness(model: &Model) -> f64 {
+    brightness_by(model, &Techniques::with(model).expect("lights"))
+}
+
+/// The same by some techniques.
+pub(super) fn brightness_by(model: &Model, techniques: &Techniques) -> f64 {
     let world = World::new(model);
-    let techniques = Techniques::with(model).expect("lights");
-    let tracer = PathTracer::new(&world, &techniques, 2);
+    let tracer = PathTracer::new(&world, techniques, 2);
     let camera = model.camera.sized(SIZE);
     let image = Progressive { tracer, camera, seed: 1 }.render(Budget::Samples(128), drop).0.image();
     let lower = &image.pixels[image.pixels.len() * 2 / 3..];

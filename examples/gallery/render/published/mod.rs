@@ -78,6 +78,7 @@ impl Published {
             direction: step / distance,
             pdf,
             distance: Some(distance),
+            lamp: None,
         })
     }
 
