@@ -23,6 +23,8 @@ enum Hostile {
     Random,
     Floor,
     One,
+    /// Factors of at least a sixteenth.
+    Moderate,
     /// Only one of many lanes is believed to be visible.
     Spikes,
 }
@@ -50,6 +52,7 @@ fn with_factors(visibility: &Visibility, kind: Hostile, pcg: &mut Pcg32) -> Visi
             Hostile::Random => pcg.below(256) as u8,
             Hostile::Floor => 0,
             Hostile::One => 255,
+            Hostile::Moderate => 63 + pcg.below(193) as u8,
             Hostile::Spikes => {
                 if pcg.below(20) == 0 {
                     255
@@ -135,8 +138,9 @@ fn estimate(lights: &LightSamplerView<'_>, x: &ShadingPoint, count: usize, pcg: 
     [mean, (squares / count - mean * mean) / count, drawn / count]
 }
 
-/// The irradiance by samples with any table is that without one: factors as small as 1.5e-5 make much noise, but no bias, so
-/// that tables are compared whose noise can be seen through.
+/// The irradiance by samples with any table is that without one. Factors as small as 1.5e-5 make so much noise that a mean over
+/// thousands of samples falls short of what a few rare ones bring; so tables are compared whose noise can be seen through. What
+/// the others do to densities is in the tests around this one.
 #[test]
 fn estimates_are_unbiased_for_any_table() {
     let scenes = few(125);
@@ -147,7 +151,7 @@ fn estimates_are_unbiased_for_any_table() {
         let scene = Scene::random(&mut pcg, content);
         let lights = build(&scene, ARITIES[number % ARITIES.len()]);
         let learned = learn(&lights, 2000);
-        for kind in [None, Some(Hostile::Floor), Some(Hostile::One), Some(Hostile::Random)] {
+        for kind in [None, Some(Hostile::Floor), Some(Hostile::One), Some(Hostile::Moderate)] {
             let visibility = kind.map_or_else(|| learned.clone(), |kind| with_factors(&learned, kind, &mut pcg));
             let view = lights.with_visibility(&visibility).expect("it was learned here");
             for i in 0..3 {
@@ -155,9 +159,7 @@ fn estimates_are_unbiased_for_any_table() {
                 let [blind, blind_variance, _] = estimate(&lights.as_view(), &x, 20_000, &mut pcg);
                 let [mean, variance, _] = estimate(&view, &x, 20_000, &mut pcg);
                 let limit = ERRORS * (variance + blind_variance).sqrt() + 1e-6 * blind;
-                // A mean over rare large values is skewed: few samples fall short of it.
-                let slack = if matches!(kind, Some(Hostile::Random)) { 0.25 * blind } else { 0.0 };
-                assert!((mean - blind).abs() <= limit + slack, "{}: {mean}, {blind} without, {kind:?}", scene.name);
+                assert!((mean - blind).abs() <= limit, "{}: {mean}, {blind} without, {kind:?}", scene.name);
             }
         }
     });
