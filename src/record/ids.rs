@@ -1,114 +1,50 @@
 //! Numbers of what a host has passed to the builder.
 
-/// A mesh that was added to a builder. Meshes are numbered from 0 in the order in which they are added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct MeshId(pub(crate) u32);
+/// Defines ids: a name, what it numbers, and its documentation.
+macro_rules! ids {
+    ($($(#[$doc:meta])* $id:ident of the $what:literal;)*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub struct $id(pub(crate) u32);
 
-impl MeshId {
-    /// Returns the id of the mesh with this number.
-    #[must_use]
-    pub const fn from_index(index: u32) -> Self {
-        Self(index)
-    }
+        impl $id {
+            #[doc = concat!("Returns the id of the ", $what, " with this number.")]
+            #[must_use]
+            pub const fn from_index(index: u32) -> Self {
+                Self(index)
+            }
 
-    /// Returns the number of the mesh.
-    #[must_use]
-    pub const fn index(self) -> u32 {
-        self.0
-    }
+            #[doc = concat!("Returns the number of the ", $what, ".")]
+            #[must_use]
+            pub const fn index(self) -> u32 {
+                self.0
+            }
+        }
+    )*};
 }
 
-/// A texture, or a function that takes the place of one, that was added to a builder. Both are numbered together from 0 in
-/// the order in which they are added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TextureId(pub(crate) u32);
+ids! {
+    /// A mesh that was added to a builder. Meshes are numbered from 0 in the order in which they are added.
+    MeshId of the "mesh";
 
-impl TextureId {
-    /// Returns the id of the texture with this number.
-    #[must_use]
-    pub const fn from_index(index: u32) -> Self {
-        Self(index)
-    }
+    /// A texture, or a function that takes the place of one, that was added to a builder. Both are numbered together from 0 in
+    /// the order in which they are added.
+    TextureId of the "texture";
 
-    /// Returns the number of the texture.
-    #[must_use]
-    pub const fn index(self) -> u32 {
-        self.0
-    }
-}
+    /// A light that was added to a builder and is not made of triangles ([`Lamp`](crate::Lamp)). These lights are numbered from
+    /// 0 in the order in which they are added.
+    LightId of the "light";
 
-/// A light that was added to a builder and is not made of triangles ([`Lamp`](crate::Lamp)). These lights are numbered from 0
-/// in the order in which they are added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LightId(pub(crate) u32);
+    /// A profile that was added to a builder. Profiles are numbered from 0 in the order in which they are added.
+    ProfileId of the "profile";
 
-impl LightId {
-    /// Returns the id of the light with this number.
-    #[must_use]
-    pub const fn from_index(index: u32) -> Self {
-        Self(index)
-    }
+    /// An object that was added to a builder: meshes that are placed by instances. Objects are numbered from 0 in the order in
+    /// which they are added.
+    ObjectId of the "object";
 
-    /// Returns the number of the light.
-    #[must_use]
-    pub const fn index(self) -> u32 {
-        self.0
-    }
-}
-
-/// A profile that was added to a builder. Profiles are numbered from 0 in the order in which they are added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ProfileId(pub(crate) u32);
-
-impl ProfileId {
-    /// Returns the id of the profile with this number.
-    #[must_use]
-    pub const fn from_index(index: u32) -> Self {
-        Self(index)
-    }
-
-    /// Returns the number of the profile.
-    #[must_use]
-    pub const fn index(self) -> u32 {
-        self.0
-    }
-}
-
-/// An object that was added to a builder: meshes that are placed by instances. Objects are numbered from 0 in the order in
-/// which they are added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ObjectId(pub(crate) u32);
-
-impl ObjectId {
-    /// Returns the id of the object with this number.
-    #[must_use]
-    pub const fn from_index(index: u32) -> Self {
-        Self(index)
-    }
-
-    /// Returns the number of the object.
-    #[must_use]
-    pub const fn index(self) -> u32 {
-        self.0
-    }
-}
-
-/// An object at one place. Instances are numbered from 0 in the order in which they are added, those of all objects together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct InstanceId(pub(crate) u32);
-
-impl InstanceId {
-    /// Returns the id of the instance with this number.
-    #[must_use]
-    pub const fn from_index(index: u32) -> Self {
-        Self(index)
-    }
-
-    /// Returns the number of the instance.
-    #[must_use]
-    pub const fn index(self) -> u32 {
-        self.0
-    }
+    /// An object at one place. Instances are numbered from 0 in the order in which they are added, those of all objects
+    /// together.
+    InstanceId of the "instance";
 }
 
 /// One triangle of one mesh.

@@ -86,8 +86,8 @@ impl SampledLight {
 pub struct LightSample {
     /// What was drawn: a point of a triangle or of another light, or a direction of the environment.
     pub light: SampledLight,
-    /// World position of the point. For the environment and distant lights, a position 10¹⁵ units away along the direction: behind everything
-    /// that a scene can hold.
+    /// World position of the point. For the environment and distant lights, a position 10¹⁵ units away along the direction:
+    /// behind everything that a scene can hold.
     pub position: Vec3,
     /// Unit normal of the front side: of a triangle, the side around which its vertices run counter-clockwise; of a sphere or
     /// a tube, the outside. For the environment, for distant lights, and for lights without an extent, the opposite of
