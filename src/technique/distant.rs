@@ -52,12 +52,12 @@ impl Distant {
     /// Draws a direction. `None` where nothing arrives from the light or group that the variates lead to.
     pub(super) fn sample(&self, at: &Viewpoint<'_>, choice: &mut Variate, u: [Variate; 2]) -> Option<DistantDirection> {
         let weights = weights(at);
-        let group = pick(&weights, sum(&weights), choice);
-        let group = at.scene.lights.extras().distant_groups().get(group)?;
+        let index = pick(&weights, sum(&weights), choice);
+        let group = at.scene.lights.extras().distant_groups().get(index)?;
         let light = if group.lights().len() > 1 { pick_light(at, group, choice)? } else { group.lights().start };
         let view = at.scene.lights.extras().distants().get(light)?.view(at.x.receiver);
         let direction = view.draw(u.map(|u| u.value()))?;
-        let pmf = self.pmf(at, light);
+        let pmf = pmf_in(at, &weights, index, light);
         let pdf = pmf * view.pdf(direction);
         (pdf > 0.0).then_some(DistantDirection { light, direction, pmf, pdf })
     }
@@ -66,11 +66,7 @@ impl Distant {
     pub(super) fn pmf(&self, at: &Viewpoint<'_>, light: usize) -> f64 {
         let groups = at.scene.lights.extras().distant_groups();
         let Some(index) = groups.iter().position(|group| group.lights().contains(&light)) else { return 0.0 };
-        let pmf = pmf(&weights(at), index.min(MOST_GROUPS - 1));
-        if pmf == 0.0 {
-            return 0.0;
-        }
-        if groups[index].lights().len() > 1 { pmf * pmf_of_light(at, &groups[index], light) } else { pmf }
+        pmf_in(at, &weights(at), index, light)
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] draws a unit direction that leads to a light with an
@@ -126,6 +122,15 @@ fn pick_light(at: &Viewpoint<'_>, group: &DistantGroup, choice: &mut Variate) ->
         }
     }
     chosen
+}
+
+/// Returns the probability of a light, by the weights of the groups and the number of its own.
+fn pmf_in(at: &Viewpoint<'_>, weights: &[f32; MOST_GROUPS], index: usize, light: usize) -> f64 {
+    let pmf = pmf(weights, index.min(MOST_GROUPS - 1));
+    match at.scene.lights.extras().distant_groups().get(index) {
+        Some(group) if pmf > 0.0 && group.lights().len() > 1 => pmf * pmf_of_light(at, group, light),
+        _ => pmf,
+    }
 }
 
 /// Returns the probability with which [`pick_light`] chooses a light.

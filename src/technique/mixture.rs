@@ -29,7 +29,8 @@ const LEAST_TREES_CLOSE: f32 = 0.2;
 const MAX_IRRADIANCE: f32 = 1e35;
 
 /// Least probability of the environment next to the lights, and of the lights next to the environment; and of distant lights
-/// next to both. Estimates know of no walls: the environment may be all but hidden where a lamp is not, and a lamp where the environment is not.
+/// next to both. Estimates know of no walls: the environment may be all but hidden where a lamp is not, and a lamp where the
+/// environment is not.
 ///
 /// Measured on the host bench's street (docs/CONSTANTS.md). A larger value wastes samples where one of both outshines the
 /// other; with a smaller one, what is dark by the estimates alone is noisier, by the inverse of this.
