@@ -46,15 +46,20 @@ pub(crate) fn bytes(data: &[u8]) {
             bytes.truncate(reader.bits() as usize % bytes.len());
         }
     }
-    // At an address that is a multiple of four.
-    let mut padded = vec![0; bytes.len() + 4];
-    let start = padded.as_ptr().align_offset(4);
-    let aligned = &mut padded[start..start + bytes.len()];
-    aligned.copy_from_slice(&bytes);
-    let Ok(view) = LightSamplerView::from_bytes(aligned) else { return };
+    let mut room = Vec::new();
+    let Ok(view) = LightSamplerView::from_bytes(aligned(&bytes, &mut room)) else { return };
     for _ in 0..4 {
         sample(&view, &mut reader);
     }
+}
+
+/// Copies bytes to an address that is a multiple of four.
+fn aligned<'r>(bytes: &[u8], room: &'r mut Vec<u8>) -> &'r [u8] {
+    *room = vec![0; bytes.len() + 4];
+    let start = room.as_ptr().align_offset(4);
+    let aligned = &mut room[start..start + bytes.len()];
+    aligned.copy_from_slice(bytes);
+    aligned
 }
 
 /// Loads bytes of a table of visibility, with some of them changed, and samples with it if it is accepted.
@@ -68,11 +73,8 @@ pub(crate) fn visibility(data: &[u8]) {
     if reader.byte().is_multiple_of(8) {
         bytes.truncate(reader.bits() as usize % bytes.len());
     }
-    let mut padded = vec![0; bytes.len() + 4];
-    let start = padded.as_ptr().align_offset(4);
-    let aligned = &mut padded[start..start + bytes.len()];
-    aligned.copy_from_slice(&bytes);
-    let Ok(table) = VisibilityView::from_bytes(aligned) else { return };
+    let mut room = Vec::new();
+    let Ok(table) = VisibilityView::from_bytes(aligned(&bytes, &mut room)) else { return };
     let Ok(view) = lights.as_view().with_visibility(table) else { return };
     for _ in 0..4 {
         sample(&view, &mut reader);
