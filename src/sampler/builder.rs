@@ -237,7 +237,8 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// # Errors
     ///
-    /// If there is no triangle, or [`Self::add_mesh`] would refuse one of the meshes.
+    /// If there is no triangle, [`Self::add_mesh`] would refuse one of the meshes, or one of them has
+    /// [light groups](Mesh::groups): an instance is in groups as a whole.
     pub fn add_object(&mut self, meshes: &[Mesh<'_>]) -> Result<ObjectId, Error> {
         self.collection.add_object(meshes)
     }
@@ -261,7 +262,8 @@ impl<'a> LightSamplerBuilder<'a> {
     /// let here = lights.at(&ShadingPoint::surface(Vec3::ZERO, Vec3::Z));
     /// let sample = here.sample([0.3, 0.6, 0.1]).expect("lamps are above");
     /// let hit = sample.hit().expect("all lights are triangles");
-    /// assert_eq!(here.pdf(&Hit::on_instance(hit.instance.unwrap(), hit.triangle, hit.barycentrics)), sample.pdf);
+    /// let instance = hit.instance.expect("all triangles are those of instances");
+    /// assert_eq!(here.pdf(&Hit::on_instance(instance, hit.triangle, hit.barycentrics)), sample.pdf);
     /// # Ok::<(), fanlight::Error>(())
     /// ```
     ///

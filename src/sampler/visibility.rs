@@ -346,7 +346,8 @@ impl Visibility {
     /// surface, or a list that is repeated. The regions of the table are where these points are. `transmittance` says which
     /// share, in `[0, 1]`, of the light of a sample gets to such a point: for a sample on a portal or of the environment, of the
     /// light that comes along its direction. Each of the `rays` asks for it once, many of them for samples drawn with what the
-    /// ones before have found. One hundred rays for each region of a square meter or so make a useful table, one thousand a good one.
+    /// ones before have found. One hundred rays for each region of a square meter or so make a useful table, one thousand a good
+    /// one.
     ///
     /// The result does not depend on the number of threads. With the feature `rayon` both functions are called by several.
     ///
@@ -451,8 +452,8 @@ impl VisibilityLearner {
     }
 }
 
-/// Returns the numbers that a ray is drawn with, first the choice of the table: hashes of its number (the finalizer of SplitMix64, Steele, Lea
-/// and Flood 2014).
+/// Returns the numbers that a ray is drawn with, first the choice of the table: hashes of its number (the finalizer of
+/// SplitMix64, Steele, Lea and Flood 2014).
 fn numbers(ray: u64) -> [f32; 4] {
     [0, 1, 2, 3].map(|dimension| {
         let mut bits = (ray.wrapping_mul(4) + dimension + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
