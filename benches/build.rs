@@ -1,15 +1,18 @@
 //! Times of building and of refitting `cloud-N`: `N` small triangles at random in the unit cube, each a mesh with a
-//! radiance of its own.
+//! radiance of its own; and of building a million instances of one lamp.
 //!
 //! With the feature `rayon` everything is timed on one thread and on all.
 
 use core::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion};
-use fanlight::{LightSampler, LightSamplerBuilder, Mesh, MeshId, MeshUpdate, Weight};
-use glam::Vec3;
+use fanlight::{Instance, LightSampler, LightSamplerBuilder, Mesh, MeshId, MeshUpdate, Weight};
+use glam::{Affine3A, Vec3};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
+
+/// Instances of a lamp.
+const INSTANCES: usize = 1_000_000;
 
 struct Cloud {
     vertices: Vec<[Vec3; 3]>,
@@ -55,6 +58,20 @@ fn refit(lights: &mut LightSampler, updates: &[MeshUpdate<'_>]) {
     lights.refit(black_box(updates)).expect("the changes are valid");
 }
 
+/// A street lamp of a thousand triangles, a million times.
+fn street() -> LightSamplerBuilder<'static> {
+    let mut pcg = Pcg32::new(2, 1);
+    let positions: Vec<Vec3> = (0..3000).map(|_| 0.1 * vector(&mut pcg)).collect();
+    let indices: Vec<[u32; 3]> = (0..1000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mut builder = LightSampler::builder();
+    let lamp = builder.add_object(&[Mesh::emitter(&positions, &indices)]).expect("the lamp is finite");
+    for _ in 0..INSTANCES {
+        let place = Affine3A::from_translation(1000.0 * vector(&mut pcg));
+        builder.add_instance(Instance::new(lamp, place)).expect("the place is near");
+    }
+    builder
+}
+
 fn rows(criterion: &mut Criterion, name: &str, threads: usize) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
     let mut group = criterion.benchmark_group(name);
@@ -72,6 +89,10 @@ fn rows(criterion: &mut Criterion, name: &str, threads: usize) {
             pool.install(|| b.iter(|| refit(&mut lights, &updates)));
         });
     }
+    group.bench_function(BenchmarkId::new("instances", INSTANCES), |b| {
+        pool.install(|| b.iter_batched(street, build, BatchSize::PerIteration));
+    });
+    println!("{INSTANCES} instances take {} bytes", build(street()).bytes().total());
     group.finish();
 }
 

@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use fanlight::{
     Environment, Glossy, Hit, Instance, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver,
-    ShadingPoint, Splitting, Texture, TriangleId, Weight,
+    ShadingPoint, Splitting, Texture, TriangleId, Visibility, Weight,
 };
 use glam::{Affine3A, Quat, Vec3};
 use smallvec::SmallVec;
@@ -57,6 +57,7 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "cloud/nee", calls: CALLS, run: || next_event("cloud-10000") },
     Case { name: "cloud/lobe-sample", calls: CALLS, run: || sample_lobe("cloud-10000") },
     Case { name: "cloud/lobe-nee", calls: CALLS, run: || next_event_lobe("cloud-10000") },
+    Case { name: "cloud/learned-nee", calls: CALLS, run: next_event_learned },
     Case { name: "cloud/build", calls: 1, run: build },
     Case { name: "quad/sample", calls: CALLS, run: || sample("quad") },
     Case {
@@ -244,6 +245,26 @@ fn next_event_at(workload: &str, change: fn(Vec<ShadingPoint>) -> Vec<ShadingPoi
     let (points, numbers) = (change(lit_points(&scene, &lights)), numbers());
     measured(|i| {
         let here = lights.at(&points[i]);
+        if let Some(sample) = here.sample(numbers[i]) {
+            black_box(here.pdf_sample_direction(&sample));
+            black_box(sample);
+        }
+    });
+}
+
+/// The same with a table of what a wall through the middle of the cloud hides.
+fn next_event_learned() {
+    const RAYS: u64 = 100_000;
+    let scene = scenes::scene("cloud-10000");
+    let lights = lights(&scene);
+    let (points, numbers) = (lit_points(&scene, &lights), numbers());
+    let seen =
+        |x: &ShadingPoint, sample: &LightSample| f32::from(u8::from((x.position.x < 0.5) == (sample.position.x < 0.5)));
+    let point = |i: u64| points[i as usize % points.len()];
+    let table = Visibility::learn(&lights.as_view(), RAYS, point, seen).expect("nobody cancels");
+    let learned = lights.with_visibility(&table).expect("it was learned for these lights");
+    measured(|i| {
+        let here = learned.at(&points[i]);
         if let Some(sample) = here.sample(numbers[i]) {
             black_box(here.pdf_sample_direction(&sample));
             black_box(sample);
