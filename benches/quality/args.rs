@@ -74,12 +74,15 @@ pub(crate) enum Part {
     Lobes,
     /// The terms that can guide the descent inside a triangle.
     Terms,
+    /// Portals by spherical harmonics: as an estimate, and as a control variate.
+    Harmonics,
     /// Error against time of rendered images.
     Room,
 }
 
 impl Part {
-    const ALL: [Self; 6] = [Self::Table, Self::Stratification, Self::Splitting, Self::Lobes, Self::Terms, Self::Room];
+    const ALL: [Self; 7] =
+        [Self::Table, Self::Stratification, Self::Splitting, Self::Lobes, Self::Terms, Self::Harmonics, Self::Room];
 }
 
 /// What the user asks for.
@@ -97,7 +100,7 @@ pub(crate) struct Args {
 
 const USAGE: &str = "cargo bench -p fanlight-benches --bench quality -- [--quick] [--json FILE] [--plots DIR] [--workload W]... \
                      [--method M]... [--points N] [--samples N] \
-                     [--table] [--stratification] [--splitting] [--lobes] [--terms] [--room] [--everything]";
+                     [--table] [--stratification] [--splitting] [--lobes] [--terms] [--harmonics] [--room] [--everything]";
 
 impl Args {
     /// Reads the command line; ignores what cargo adds.
@@ -125,6 +128,7 @@ impl Args {
                 "--splitting" => args.parts.push(Part::Splitting),
                 "--lobes" => args.parts.push(Part::Lobes),
                 "--terms" => args.parts.push(Part::Terms),
+                "--harmonics" => args.parts.push(Part::Harmonics),
                 "--room" => args.parts.push(Part::Room),
                 "--everything" => args.parts = Part::ALL.to_vec(),
                 _ => return Err(format!("unknown argument {word}\n{USAGE}")),

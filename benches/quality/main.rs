@@ -1,7 +1,8 @@
 //! How noisy, how fast and how large the crate's sampling is, next to other methods on the same workloads.
 //!
 //! `cargo bench -p fanlight-benches --bench quality` prints one row for each workload, method and class of shading points; `-- --quick`
-//! takes less than a minute. `-- --stratification`, `--splitting`, `--lobes`, `--terms` and `--room` run a study instead, and
+//! takes less than a minute. `-- --stratification`, `--splitting`, `--lobes`, `--terms`, `--harmonics`
+//! and `--room` run a study instead, and
 //! `--everything` all of them after the table.
 //!
 //! Some workloads can be handed to a method in two ways: openings as holes or as a clip map, a clip map that is read
@@ -12,6 +13,7 @@ mod args;
 mod building;
 mod comparison;
 mod fairness;
+mod harmonics;
 #[path = "../instruction_set.rs"]
 mod instruction_set;
 mod methods;
@@ -59,6 +61,7 @@ fn run(args: &Args) -> Result<(), Failure> {
             }
             Part::Room => studies::room::run(args)?,
             Part::Terms => studies::terms::run(&args.effort),
+            Part::Harmonics => studies::harmonics::run(&args.effort),
         }
     }
     Ok(())

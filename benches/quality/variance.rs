@@ -12,7 +12,7 @@ use crate::scenes::sky::{SUN_SAMPLE_SOLID_ANGLE, Sky};
 /// Every so manieth direction of the sun stands for its neighbours.
 const SUN_STRIDE: usize = 5;
 /// Radiance that only the sun exceeds.
-const BRIGHT: f32 = 2.0;
+pub(crate) const BRIGHT: f32 = 2.0;
 
 /// What was measured at one point.
 #[derive(Clone, Copy, Debug)]
@@ -175,7 +175,7 @@ fn relative(scene: &Scene, light: usize, x: &ShadingPoint) -> [DVec3; 3] {
 }
 
 /// The point of an opening that a direction passes.
-fn locate(scene: &Scene, x: &ShadingPoint, direction: DVec3) -> Option<Drawn> {
+pub(crate) fn locate(scene: &Scene, x: &ShadingPoint, direction: DVec3) -> Option<Drawn> {
     // With several walls methods look at the direction alone.
     let (light, _) = scene.walls[0].meet(x.position.as_dvec3(), direction, scene.image.as_ref())?;
     let barycentrics = barycentrics(&relative(scene, light, x), direction).map(|b| b as f32);

@@ -6,7 +6,9 @@ mod discrete;
 mod environment_reject;
 mod every_light;
 mod fanlight;
+pub(crate) mod harmonic;
 mod light_bounds;
+mod portal_environment;
 mod power;
 mod rectified;
 mod talk;
@@ -20,6 +22,7 @@ use glam::Vec3;
 
 pub(crate) use self::fanlight::Fanlight;
 use crate::scenes::Scene;
+use crate::variance::BRIGHT;
 pub(crate) use arvo::{barycentrics, crosses};
 pub(crate) use discrete::Cumulative;
 pub(crate) use triangle::OnTriangle;
@@ -112,22 +115,51 @@ pub(crate) fn names(workload: &str) -> &'static [&'static str] {
             "talk-boundary",
             "talk-footprint",
             "environment-reject",
+            "portal-environment",
+            "uniform-solid-angle",
+            "harmonics-3",
+            "harmonics-9",
+            "rectified",
+        ],
+        "grid-1" => &[
+            "fanlight",
+            "talk-footprint",
+            "environment-reject",
+            "portal-environment",
             "uniform-solid-angle",
             "rectified",
         ],
-        "grid-1" => &["fanlight", "talk-footprint", "environment-reject", "uniform-solid-angle", "rectified"],
-        "nested" | "grid-100" => &[
+        "nested" => &[
             "fanlight",
             "talk-footprint",
             "environment-reject",
             "power",
             "every-light",
+            "portal-environment",
             "uniform-solid-angle",
             "rectified",
         ],
-        "grid-10000" => {
-            &["fanlight", "talk-footprint", "environment-reject", "power", "uniform-solid-angle", "rectified"]
-        }
+        "grid-100" => &[
+            "fanlight",
+            "talk-footprint",
+            "environment-reject",
+            "power",
+            "every-light",
+            "portal-environment",
+            "uniform-solid-angle",
+            "harmonics-3",
+            "harmonics-9",
+            "rectified",
+        ],
+        "grid-10000" => &[
+            "fanlight",
+            "talk-footprint",
+            "environment-reject",
+            "power",
+            "portal-environment",
+            "uniform-solid-angle",
+            "rectified",
+        ],
         // What does not see the clip map does the same as without.
         _ => &["fanlight", "talk-footprint", "uniform-solid-angle", "rectified"],
     }
@@ -164,6 +196,12 @@ pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
         "tessellated" => Box::new(tessellated::Tessellated::new(scene)),
         "environment-reject" => Box::new(environment_reject::EnvironmentReject::new(scene)),
         "rectified" => Box::new(rectified::Rectified::new(scene)),
+        "portal-environment" => Box::new(portal_environment::PortalEnvironment::new(scene)),
+        "harmonics-3" | "harmonics-9" => {
+            let degree = if name == "harmonics-3" { 3 } else { 9 };
+            let choice = Choice::Harmonic(harmonic::Harmonic::new(scene, degree, f64::from(BRIGHT)));
+            Box::new(ThenPoint::new(scene, choice, OnTriangle::SolidAngle))
+        }
         _ => panic!("no method is called {name}"),
     }
 }

@@ -6,9 +6,10 @@ use glam::DVec3;
 use super::arvo::{SphericalTriangle, barycentrics, crosses};
 use super::binary_tree::BinaryTree;
 use super::every_light::EveryLight;
+use super::harmonic::Harmonic;
 use super::power::{Power, scene_bounds};
 use super::wide_tree::WideTree;
-use super::{Drawn, Method};
+use super::{Cumulative, Drawn, Method};
 use crate::oracle::lambert::solid_angle;
 use crate::scenes::Scene;
 
@@ -22,6 +23,8 @@ pub(crate) enum Choice {
     /// The talk's, by the conservative term.
     Wide(WideTree),
     Every(EveryLight),
+    /// By the irradiance of every portal, from spherical harmonics.
+    Harmonic(Harmonic),
     /// In proportion to the solid angles: uniform over an opening of two triangles.
     SolidAngle,
 }
@@ -95,6 +98,7 @@ impl<'a> ThenPoint<'a> {
             Choice::Tree(tree) => tree.sample(x, &mut f64::from(u)),
             Choice::Wide(tree) => tree.sample(f64::from(u), |bounds| bounds.one_sided_importance(x)),
             Choice::Every(every) => every.sample(x, u),
+            Choice::Harmonic(harmonic) => pick(&harmonic.weights(x), u),
             Choice::SolidAngle => {
                 let second = self.second_share(x);
                 let light = usize::from(f64::from(u) >= 1.0 - second);
@@ -109,6 +113,10 @@ impl<'a> ThenPoint<'a> {
             Choice::Tree(tree) => tree.pmf(x, light),
             Choice::Wide(tree) => tree.pmf(light, |bounds| bounds.one_sided_importance(x)),
             Choice::Every(every) => every.pmf(x, light),
+            Choice::Harmonic(harmonic) => {
+                let (weights, sum) = harmonic.weights(x);
+                weights[light] / sum
+            }
             Choice::SolidAngle if light == 1 => self.second_share(x),
             Choice::SolidAngle => 1.0 - self.second_share(x),
         }
@@ -131,6 +139,12 @@ impl<'a> ThenPoint<'a> {
         };
         (0..self.triangles.len()).map(density).sum()
     }
+}
+
+/// The entry that `u` falls into, and its probability; `None` if all weights are zero.
+fn pick((weights, sum): &(Vec<f64>, f64), u: f32) -> Option<(usize, f64)> {
+    let table = Cumulative::new(weights.iter().copied());
+    (*sum > 0.0).then(|| table.sample(u)).map(|entry| (entry, weights[entry] / sum))
 }
 
 /// Density per solid angle of a uniform density over the area: `d² / (A cos θ)`.
@@ -186,6 +200,10 @@ impl Method for ThenPoint<'_> {
         if let Choice::Every(every) = &self.choice {
             return Some(every.pmfs(x));
         }
+        if let Choice::Harmonic(harmonic) = &self.choice {
+            let (weights, sum) = harmonic.weights(x);
+            return Some(weights.into_iter().map(|weight| weight / sum).collect());
+        }
         let pmf = |light: usize| if wanted(light) { self.pmf(x, light) } else { 0.0 };
         Some((0..self.scene.lights.len()).map(pmf).collect())
     }
@@ -196,6 +214,7 @@ impl Method for ThenPoint<'_> {
             Choice::Tree(tree) => tree.bytes(),
             Choice::Wide(tree) => tree.bytes(),
             Choice::Every(every) => every.bytes(),
+            Choice::Harmonic(harmonic) => harmonic.bytes(),
             Choice::SolidAngle => 0,
         };
         choice + size_of_val(&self.triangles[..])

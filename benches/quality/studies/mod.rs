@@ -1,5 +1,6 @@
 //! Questions that the table does not answer.
 
+pub(crate) mod harmonics;
 pub(crate) mod lobes;
 pub(crate) mod room;
 pub(crate) mod splitting;
