@@ -221,6 +221,11 @@ impl Method for ThenPoint<'_> {
     }
 
     fn is_slow(&self) -> bool {
-        matches!(self.choice, Choice::Every(_)) && self.triangles.len() > FEW
+        match self.choice {
+            Choice::Every(_) => self.triangles.len() > FEW,
+            // Microseconds a portal.
+            Choice::Harmonic(_) => self.triangles.len() > 2,
+            _ => false,
+        }
     }
 }
