@@ -169,7 +169,7 @@ pub use light::{
     DiskLight, DistantLight, Illumination, Instance, Lamp, Mesh, MeshUpdate, PointLight, Profile, ProfileLight, Sides,
     SphereLight, SpotLight, TubeLight, Weight,
 };
-pub use receiver::{Glossy, Receiver, Scattering, ShadingPoint};
+pub use receiver::{Effort, Glossy, Receiver, Scattering, ShadingPoint};
 pub use record::{
     Filter, Hit, InstanceId, LightId, LightSample, MeshId, ObjectId, ProfileId, SampledLight, TextureId, TriangleId,
     Wrap,

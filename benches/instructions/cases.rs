@@ -3,7 +3,7 @@
 use core::hint::black_box;
 
 use fanlight::{
-    Environment, Glossy, Hit, Instance, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver,
+    Effort, Environment, Glossy, Hit, Instance, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver,
     ShadingPoint, Splitting, Texture, TriangleId, Visibility, Weight,
 };
 use glam::{Affine3A, Quat, Vec3};
@@ -81,10 +81,12 @@ pub(crate) const ALL: &[Case] = &[
     },
     Case { name: "window/at", calls: CALLS, run: at },
     Case { name: "window/nee", calls: CALLS, run: || next_event("window") },
+    Case { name: "window/least-nee", calls: CALLS, run: || next_event_least("window") },
     Case { name: "window/lobe-nee", calls: CALLS, run: || next_event_lobe("window") },
     Case { name: "window/emission", calls: CALLS, run: emission },
     Case { name: "star/sample", calls: CALLS, run: || sample("star") },
     Case { name: "star/nee", calls: CALLS, run: || next_event("star") },
+    Case { name: "star/least-nee", calls: CALLS, run: || next_event_least("star") },
     Case { name: "grid-100/sample", calls: CALLS, run: || sample("grid-100") },
     Case { name: "grid-100/nee", calls: CALLS, run: || next_event("grid-100") },
     Case {
@@ -233,6 +235,11 @@ fn lit_points(scene: &Scene, lights: &LightSampler) -> Vec<ShadingPoint> {
 /// What a host does at a lit point for one light sample.
 fn next_event(workload: &str) {
     next_event_at(workload, |points| points);
+}
+
+/// The same with the least effort.
+fn next_event_least(workload: &str) {
+    next_event_at(workload, |points| points.into_iter().map(|x| x.with_effort(Effort::Least)).collect());
 }
 
 fn next_event_lobe(workload: &str) {

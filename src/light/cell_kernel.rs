@@ -97,17 +97,18 @@ impl<G: Guide, L: Lobe> Kernel for CellDescent<'_, G, L> {
 impl<'a, L: Lobe> CellKernel<'a, L> {
     #[inline(always)]
     fn new(view: &'a TriangleView<'a>, lobe: L) -> Self {
+        let environment = view.followed_environment();
         Self {
             view,
             weights: view.receiver.height_weights(),
-            lobe: match view.environment {
+            lobe: match environment {
                 Some(environment) => lobe.map(|vector| environment.local_vector(vector)),
                 None => lobe,
             },
             horizon: view.cell_horizon(),
             least_distance2: at_least(view.height * view.height, f32::MIN_POSITIVE),
-            environment: view.environment,
-            is_rough: view.environment.is_some_and(EnvironmentView::is_rough),
+            environment,
+            is_rough: environment.is_some_and(EnvironmentView::is_rough),
         }
     }
 

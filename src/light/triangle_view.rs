@@ -12,7 +12,7 @@ use crate::blas::{CellNode, Draw, Follow, Guide, LEAF, Lattice, LatticeCell, Roo
 use crate::env::{DirectionCone, EnvironmentView};
 use crate::geometry;
 use crate::math;
-use crate::receiver::{Lobe, Receiver, ReceiverKind, ShadingPoint, for_lobe};
+use crate::receiver::{Effort, Lobe, Receiver, ReceiverKind, ShadingPoint, for_lobe};
 use crate::simd::{InstructionSet, Kernel};
 use crate::warp::Variate;
 use crate::warp::equal_area::sphere_to_square_quickly;
@@ -69,6 +69,7 @@ pub(crate) struct TriangleView<'a> {
     pub(super) illumination: Illumination,
     /// What the triangle is a portal to, if that depends on the direction.
     pub(super) environment: Option<&'a EnvironmentView<'a>>,
+    effort: Effort,
     /// The tree over the texture.
     pub(crate) root: Root,
     /// Nodes of the trees over textures.
@@ -151,6 +152,7 @@ impl<'a> TriangleView<'a> {
             exact_height: height,
             illumination,
             environment: environment.filter(|_| light.is_portal()),
+            effort: x.effort,
             root: light.root,
             cells,
         }))
@@ -203,7 +205,7 @@ impl<'a> TriangleView<'a> {
     /// Whether what is seen through a portal is about constant over it.
     #[inline]
     pub(super) fn has_constant_radiance(&self, center: Vec3, distance2: f32) -> bool {
-        self.environment.is_none_or(|environment| {
+        self.followed_environment().is_none_or(|environment| {
             let inverse = 1.0 / math::sqrt(distance2);
             let solid_angle = self.area * self.height * (inverse * inverse * inverse);
             let direction = environment.local_direction(center * inverse);
@@ -218,6 +220,18 @@ impl<'a> TriangleView<'a> {
         let [a, b, c] = self.exact_vertices;
         let step = normal.dot(b - a).abs() + normal.dot(c - a).abs();
         self.receiver.has_horizon() && normal.dot(point) < -LATTICE_ROUNDING * step
+    }
+
+    /// What points are drawn by beside the triangle itself, if that depends on the direction.
+    #[inline(always)]
+    pub(super) fn followed_environment(&self) -> Option<&'a EnvironmentView<'a>> {
+        self.environment.filter(|_| self.effort != Effort::Least)
+    }
+
+    /// Whether all directions to what is visible of a triangle without a texture are equally likely.
+    #[inline(always)]
+    fn draws_uniformly(&self) -> bool {
+        self.effort == Effort::Least || !self.resolves_directions()
     }
 
     /// Whether the lattice resolves directions.
@@ -316,7 +330,7 @@ impl<L: Lobe> Kernel for SampleDirection<'_, '_, L> {
     fn run(self) -> Self::Output {
         let Self { view, lobe, u } = self;
         let grid = SphericalGrid::new(view, lobe)?;
-        if !view.resolves_directions() {
+        if view.draws_uniformly() {
             return Some(sample_uniformly(view, &grid, u));
         }
         Some(sample_grid(view, &grid, u))
@@ -334,9 +348,9 @@ fn sample_grid(view: &TriangleView<'_>, grid: &SphericalGrid<'_, impl Lobe>, u: 
     Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative, pdf })
 }
 
-/// Draws a point so near that neighbors of the lattice are seen in very different directions: one direction is as likely as
-/// any other, so that the density does not depend on how it was rounded.
-#[cold]
+/// Draws a point by a uniform direction. Where neighbors of the lattice are seen in very different directions, the direction is
+/// kept as it was drawn: the density does not depend on how it was rounded.
+#[inline(never)]
 fn sample_uniformly(
     view: &TriangleView<'_>,
     grid: &SphericalGrid<'_, impl Lobe>,
@@ -344,8 +358,9 @@ fn sample_uniformly(
 ) -> Option<DrawnPoint> {
     let direction = grid.draw_uniformly(u);
     let (barycentrics, distance) = geometry::cross_plane(view.exact_vertices, direction)?;
-    let point = LocalPoint::on_triangle(Lattice::inside(barycentrics));
-    Some(DrawnPoint { point, relative: direction * distance, pdf: grid.uniform_pdf() })
+    let point = Lattice::inside(barycentrics);
+    let relative = if view.resolves_directions() { view.position(point) } else { direction * distance };
+    Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative, pdf: grid.uniform_pdf() })
 }
 
 /// Finds the density of a point that is drawn by its direction. `None` where cells are drawn by area.
@@ -364,7 +379,7 @@ impl<L: Lobe> Kernel for PdfOfDirection<'_, '_, L> {
         let Self { view, lobe, point } = self;
         let grid = SphericalGrid::new(view, lobe)?;
         let relative = view.position(point);
-        if !view.resolves_directions() {
+        if view.draws_uniformly() {
             return Some((!view.is_below_horizon(relative)).then(|| grid.uniform_pdf()));
         }
         Some(density(view, &grid, relative, None))

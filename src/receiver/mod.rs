@@ -5,6 +5,7 @@
 //! irradiance, and what the loop over the lanes of a tree's node needs. A new kind is a new file, a variant of
 //! [`Receiver`] and a line in `dispatch`. If it has a [`Lobe`], that is a line in `for_lobe` as well.
 
+mod effort;
 mod glossy;
 mod lambert;
 mod lanes;
@@ -18,6 +19,7 @@ mod volume;
 use glam::Vec3;
 
 use crate::math::at_least;
+pub use effort::Effort;
 pub use glossy::Glossy;
 pub(crate) use lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 pub(crate) use lobe::{Lobe, NoLobe, SPREAD_OF_RADIUS2, SPREAD_OF_SOLID_ANGLE, for_lobe};
@@ -53,6 +55,8 @@ pub struct ShadingPoint {
     pub receiver: Receiver,
     /// Light groups that the point receives, a set of bits: a light arrives if it is in any of them. All by default.
     pub groups: u32,
+    /// How much a call may do to follow the light. [`Effort::Full`] by default.
+    pub effort: Effort,
 }
 
 /// All light groups. *Format.*
@@ -101,7 +105,7 @@ impl ShadingPoint {
             Receiver::Scattering(medium) if !medium.has_lobe() => Receiver::Volume,
             receiver @ (Receiver::Glossy(_) | Receiver::Scattering(_)) => receiver,
         };
-        Self { position, receiver, groups: ALL_GROUPS }
+        Self { position, receiver, groups: ALL_GROUPS, effort: Effort::Full }
     }
 
     /// Sets the light groups that the point receives, a set of bits. All by default.
@@ -114,24 +118,31 @@ impl ShadingPoint {
         self
     }
 
+    /// Sets how much a call may do to follow the light: [`Effort::Full`] by default. Samples and densities are exact with either.
+    #[must_use]
+    pub const fn with_effort(mut self, effort: Effort) -> Self {
+        self.effort = effort;
+        self
+    }
+
     /// Returns a point on an opaque surface. `normal` is a unit vector to the side that light is gathered from; see
     /// [`Self::new`] for other lengths.
     #[must_use]
     pub fn surface(position: Vec3, normal: Vec3) -> Self {
-        Self { position, receiver: Receiver::Surface(unit(normal)), groups: ALL_GROUPS }
+        Self { position, receiver: Receiver::Surface(unit(normal)), groups: ALL_GROUPS, effort: Effort::Full }
     }
 
     /// Returns a point on a surface that gathers light from both sides. `normal` is a unit vector; see [`Self::new`] for
     /// other lengths.
     #[must_use]
     pub fn transmissive(position: Vec3, normal: Vec3) -> Self {
-        Self { position, receiver: Receiver::Transmissive(unit(normal)), groups: ALL_GROUPS }
+        Self { position, receiver: Receiver::Transmissive(unit(normal)), groups: ALL_GROUPS, effort: Effort::Full }
     }
 
     /// Returns a point in a participating medium.
     #[must_use]
     pub const fn volume(position: Vec3) -> Self {
-        Self { position, receiver: Receiver::Volume, groups: ALL_GROUPS }
+        Self { position, receiver: Receiver::Volume, groups: ALL_GROUPS, effort: Effort::Full }
     }
 
     /// Returns a point on an opaque surface with a glossy lobe.

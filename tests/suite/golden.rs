@@ -13,7 +13,9 @@ use crate::groups::scene as grouped;
 use crate::instances;
 use crate::instances::town::Town;
 use crate::kinds::{mixed, pdf_again};
-use fanlight::{LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId, Visibility};
+use fanlight::{
+    Effort, LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId, Visibility,
+};
 use glam::Vec3;
 
 const SCENES: usize = 70;
@@ -26,6 +28,8 @@ const GROUPS: usize = 6;
 const LEARNED: usize = 6;
 /// Scenes of instances.
 const TOWNS: usize = 12;
+/// Scenes that are sampled with the least effort.
+const LEAST: usize = 12;
 
 /// End of the scenes that mix all kinds.
 const LAST_KIND: usize = SCENES + KINDS;
@@ -33,6 +37,8 @@ const LAST_KIND: usize = SCENES + KINDS;
 const LAST_GROUPS: usize = LAST_KIND + GROUPS;
 /// End of the scenes with learned visibility.
 const LAST_LEARNED: usize = LAST_GROUPS + LEARNED;
+/// End of the scenes of instances.
+const LAST_TOWN: usize = LAST_LEARNED + TOWNS;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// The same scenes at points with lobes.
@@ -190,6 +196,18 @@ fn line_of_learned(number: usize) -> String {
     format!("{number:2} learned {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene that is sampled with the least effort.
+fn line_of_least(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 85);
+    let scene = random_scene(number, &mut pcg);
+    let lights = build(&scene, ARITIES[number % ARITIES.len()]);
+    let mut hash = Hash::new();
+    let points = (0..POINTS).map(|i| shading_point(number + i, &scene, &mut pcg).with_effort(Effort::Least));
+    let points: Vec<_> = points.collect();
+    let drawn: usize = points.iter().map(|x| ask(&lights, x, &mut pcg, &mut hash)).sum();
+    format!("{number:2} least {drawn:5} {:016x}\n", hash.0)
+}
+
 /// One line about a scene of instances.
 fn line_of_town(number: usize) -> String {
     let mut pcg = Pcg32::new(number as u64, 83);
@@ -229,13 +247,14 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED + TOWNS };
+    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED + TOWNS + LEAST };
     let line = |i| match i {
         0..SCENES => line(i, has_lobes),
         SCENES..LAST_KIND => line_of_kinds(i - SCENES),
         LAST_KIND..LAST_GROUPS => line_of_groups(i - LAST_KIND),
         LAST_GROUPS..LAST_LEARNED => line_of_learned(i - LAST_GROUPS),
-        _ => line_of_town(i - LAST_LEARNED),
+        LAST_LEARNED..LAST_TOWN => line_of_town(i - LAST_LEARNED),
+        _ => line_of_least(i - LAST_TOWN),
     };
     let found = parallel::map(SCENES + more, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {

@@ -25,6 +25,8 @@ pub(crate) struct Vertex {
     /// Unit direction back along the path.
     pub(crate) outgoing: Vec3,
     pub(crate) material: Material,
+    /// Number of surfaces between it and the camera.
+    pub(crate) depth: u32,
 }
 
 impl Vertex {
@@ -141,6 +143,7 @@ mod tests {
                 normal: Vec3::Z,
                 outgoing: outgoing.normalize(),
                 material: Material::Glossy { alpha, share: 1.0 },
+                depth: 0,
             };
             let mut random = Pcg32::new(1, 2);
             let (mut by_surface, mut by_sphere, mut above, mut total) = (0.0, 0.0, 0.0, 0.0);

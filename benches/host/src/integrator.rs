@@ -90,7 +90,7 @@ fn radiance<L: Lighting>(world: &World, lighting: &L, mut vertex: Vertex, bounce
             Meeting::Surface(next) => {
                 if bounce < bounces {
                     throughput *= scattered / pdf;
-                    vertex = next;
+                    vertex = Vertex { depth: bounce, ..next };
                 }
             }
         }

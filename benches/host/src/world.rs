@@ -159,7 +159,7 @@ impl World {
                 let normal = Vec3::from(self.facets[hit.primitive_id as usize].cross).normalize();
                 let normal = if normal.dot(direction) < 0.0 { normal } else { -normal };
                 let position = (position + OFFSET * normal).clamp(self.inside[0], self.inside[1]);
-                Meeting::Surface(Vertex { position, normal, outgoing: -direction, material })
+                Meeting::Surface(Vertex { position, normal, outgoing: -direction, material, depth: 0 })
             }
         }
     }

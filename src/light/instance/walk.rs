@@ -86,7 +86,7 @@ impl<'a> ObjectWalk<'a> {
             records: parts.records,
             object: placed.object,
             x: *x,
-            own: ShadingPoint { position, receiver, groups: x.groups },
+            own: ShadingPoint { position, receiver, groups: x.groups, effort: x.effort },
             normal_length,
             margin,
             is_simple: !x.receiver.has_lobe() && placement.is_similarity(),

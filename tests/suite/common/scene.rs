@@ -1,8 +1,8 @@
 //! Scenes as plain descriptions, from which a sampler is built and an oracle computes.
 
 use fanlight::{
-    Arity, Environment, Filter, Glossy, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver, Scattering,
-    ShadingPoint, Sides, Texture, Weight, Wrap,
+    Arity, Effort, Environment, Filter, Glossy, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver,
+    Scattering, ShadingPoint, Sides, Texture, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -255,6 +255,22 @@ pub(crate) fn random_point(pcg: &mut Pcg32, kind: usize) -> ShadingPoint {
     let normal = pcg.direction();
     let receiver = [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][kind % 3];
     ShadingPoint::new(position, receiver)
+}
+
+/// Number of the first kind of [`point_of_kind`] with a lobe; those below have none.
+pub(crate) const LOBES: usize = 3;
+/// Number of its first kind with the least effort.
+pub(crate) const LEAST_EFFORT: usize = 6;
+
+/// A random point of one of nine kinds: three receivers, the same with lobes of at least this roughness, the first again with
+/// the least effort.
+pub(crate) fn point_of_kind(pcg: &mut Pcg32, kind: usize, roughness: f32) -> ShadingPoint {
+    let x = random_point(pcg, kind);
+    match kind {
+        0..LOBES => x,
+        LOBES..LEAST_EFFORT => with_lobe(x, pcg, roughness),
+        _ => x.with_effort(Effort::Least),
+    }
 }
 
 /// The same point with a lobe: a glossy surface in place of a surface, of a roughness between `least` and 1, and a phase

@@ -4,7 +4,7 @@
 //! that point alone; a sample on a portal stands for the sky along the direction, through whatever portals the ray crosses.
 
 use fanlight::{
-    Environment, Filter, Glossy, Hit, LightSample, LightSampler, Mesh, MeshId, PointSampler, SampledLight,
+    Effort, Environment, Filter, Glossy, Hit, LightSample, LightSampler, Mesh, MeshId, PointSampler, SampledLight,
     ShadingPoint, Texture, TriangleId, Visibility, Weight, Wrap,
 };
 use glam::Vec3;
@@ -31,6 +31,8 @@ pub(super) struct Fanlight {
     open_sky: bool,
     /// Whether glossy surfaces are handed over as such.
     tells_lobes: bool,
+    /// How much a call may do at the first vertex of a path, and at later ones.
+    efforts: [Effort; 2],
     /// What walls hide, if that has been learned.
     visibility: Option<Visibility>,
 }
@@ -75,6 +77,7 @@ impl Fanlight {
             starts: starts.collect(),
             open_sky,
             tells_lobes: true,
+            efforts: [Effort::Full; 2],
             visibility: None,
         })
     }
@@ -82,6 +85,11 @@ impl Fanlight {
     /// Returns the same without lobes: all surfaces are taken for diffuse ones.
     pub(super) fn blind(self) -> Self {
         Self { tells_lobes: false, ..self }
+    }
+
+    /// Returns the same with an effort at the first vertex of a path, and another at later ones.
+    pub(super) fn with_efforts(self, efforts: [Effort; 2]) -> Self {
+        Self { efforts, ..self }
     }
 
     /// Returns the same with what walls hide, learned at vertices of paths through the camera.
@@ -108,12 +116,13 @@ impl Fanlight {
     /// Returns what the crate is told of a vertex.
     #[inline]
     fn shading_point(&self, vertex: &Vertex) -> ShadingPoint {
-        match vertex.material {
+        let point = match vertex.material {
             Material::Glossy { alpha, .. } if self.tells_lobes => {
                 ShadingPoint::glossy(vertex.position, Glossy::new(vertex.normal, vertex.outgoing, alpha))
             }
             _ => ShadingPoint::surface(vertex.position, vertex.normal),
-        }
+        };
+        point.with_effort(self.efforts[usize::from(vertex.depth > 0)])
     }
 }
 

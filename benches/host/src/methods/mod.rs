@@ -8,6 +8,7 @@ mod plain;
 mod portals;
 mod spherical_rectangle;
 
+use ::fanlight::Effort;
 use glam::Vec3;
 
 use crate::Error;
@@ -94,6 +95,11 @@ impl Method {
         let ours =
             |name, fanlight| Self { name, lighting: AnyLighting::Fanlight(Box::new(fanlight)), preparation: 0.0 };
         methods.push(ours("fanlight", Fanlight::new(world)?));
+        if !world.scene.portals.is_empty() {
+            for (name, first) in [("fanlight@later-least", Effort::Full), ("fanlight@least", Effort::Least)] {
+                methods.push(ours(name, Fanlight::new(world)?.with_efforts([first, Effort::Least])));
+            }
+        }
         let is_glossy = |(_, material): &(_, Material)| matches!(material, Material::Glossy { .. });
         if world.scene.solids.iter().any(is_glossy) {
             methods.push(ours("fanlight@blind", Fanlight::new(world)?.blind()));
