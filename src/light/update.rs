@@ -6,7 +6,8 @@ use glam::Vec3;
 
 use super::distant::{self, DistantRecord};
 use super::extras;
-use super::mesh::{MeshUpdate, check_triangles};
+use super::mesh::{MeshUpdate, check_end, check_triangles};
+use super::motion::{end_vertices, has_area_between};
 use super::{Lamp, LampRecord, Lights, NO_AREA};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
@@ -82,9 +83,12 @@ impl Lights {
                 return Err(Error(ErrorKind::TriangleCount { mesh, found: indices.len(), expected: leaves.len() }));
             }
             check_triangles(mesh, positions, indices)?;
-            let revived = |&(&leaf, indices): &(&u32, &[u32; 3])| {
-                leaf == NO_AREA && triangle(positions, *indices).normal_and_area().is_some()
+            update.end.map_or(Ok(()), |end| check_end(mesh, positions.len(), end))?;
+            let has_area = |&indices: &[u32; 3]| match update.end {
+                None => triangle(positions, indices).normal_and_area().is_some(),
+                Some(end) => has_area_between(positions, end, indices),
             };
+            let revived = |&(&leaf, indices): &(&u32, &[u32; 3])| leaf == NO_AREA && has_area(indices);
             if let Some(triangle) = leaves.iter().zip(indices).position(|pair| revived(&pair)) {
                 return Err(Error(ErrorKind::Revived { mesh, triangle }));
             }
@@ -101,11 +105,18 @@ impl Lights {
     fn apply(&mut self, update: &MeshUpdate<'_>) {
         let mesh = update.mesh.0 as usize;
         let range = self.range(mesh);
+        let first = range.start;
         if let Some((positions, indices)) = update.triangles {
             for (&leaf, &indices) in self.leaf_of[range].iter().zip(indices) {
                 if let Some(light) = self.records.get_mut(leaf as usize) {
                     light.vertices = triangle(positions, indices).0.map(Vec3::into);
+                    let end = update.end.map(|end| triangle(end, indices).0.map(Vec3::into));
+                    light.mark_motion(end.as_ref());
                 }
+            }
+            if update.end.is_some() || !self.view().extras().motion().is_empty() {
+                let ends = update.end.map_or_else(Vec::new, |end| end_vertices(end, indices));
+                self.update_motion(|motion| motion.set_mesh(first as u32, ends));
             }
         }
         if let Some(scale) = update.scale {

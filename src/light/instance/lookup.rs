@@ -11,7 +11,7 @@ impl PlacedObject<'_> {
     /// Returns all triangles in their places, rounded to single precision, with their fronts as the order of their vertices
     /// says. What else they hold counts for nothing.
     pub(in crate::light) fn flattened(&self) -> impl Iterator<Item = LightTriangle> {
-        let is_mirrored = self.record.placement().is_mirrored();
+        let is_mirrored = self.placement().is_mirrored();
         (0..self.object.len() as u32).map(move |below| {
             let triangle = self.triangle(below);
             let [a, b, c] = triangle.exactly_relative_to(Vec3::ZERO).map(|vertex| vertex.as_vec3().to_array());
@@ -45,7 +45,7 @@ impl<'a> LightsView<'a> {
     pub(crate) fn instance(&self, leaf: u32) -> Option<PlacedObject<'a>> {
         match self.light(leaf) {
             Light::Instance(placed) => Some(placed),
-            Light::Triangle(_) | Light::Lamp(_) => None,
+            Light::Triangle(_) | Light::Lamp(_) | Light::Moving(_) => None,
         }
     }
 
