@@ -229,7 +229,10 @@ impl fmt::Display for ErrorKind {
                 write!(f, "instance {instance} was never added, this sampler has {instances}")
             }
             ErrorKind::EndCount { mesh, found, vertices } => {
-                write!(f, "mesh {mesh}: {found} vertices at the end of the shutter interval, but {vertices} at its start")
+                write!(
+                    f,
+                    "mesh {mesh}: {found} vertices at the end of the shutter interval, but {vertices} at its start"
+                )
             }
             ErrorKind::MotionInObject { object, mesh } => {
                 write!(f, "object {object}: the vertices of mesh {mesh} move, but only the object's instances can")

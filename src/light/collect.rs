@@ -142,7 +142,7 @@ impl<'a> LightCollection<'a> {
                 return Err(error);
             }
         }
-        if let Some(end) = mesh.end {
+        if let Some(end) = mesh.end.filter(|end| *end != mesh.positions) {
             self.motion.set_mesh(before.1 as u32, end_vertices(end, mesh.indices));
         }
         self.meshes.push(self.indices.len() as u32);

@@ -540,6 +540,21 @@ impl<'a> LightsView<'a> {
     /// Returns what the weight of a light is multiplied by.
     #[inline]
     pub(crate) fn scale(&self, leaf: LightLeaf) -> f32 {
-        self.light(leaf.top).scale(self.scales, self.meshes)
+        match self.still(leaf.top) {
+            Some(triangle) => scale_of(self.scales, self.meshes, triangle.index()),
+            None => self.scale_of_other(leaf.top),
+        }
+    }
+
+    #[inline(never)]
+    fn scale_of_other(&self, leaf: u32) -> f32 {
+        self.light(leaf).scale(self.scales, self.meshes)
+    }
+
+    /// Returns the triangle in a leaf if it stands still, as those in most leaves do; `None` for any other light.
+    #[inline(always)]
+    fn still(&self, leaf: u32) -> Option<&'a LightTriangle> {
+        let record = &self.records[leaf as usize];
+        (record.index_and_flags & LightTriangle::LAMP == 0).then_some(record)
     }
 }

@@ -114,8 +114,9 @@ impl Lights {
                     light.mark_motion(end.as_ref());
                 }
             }
-            if update.end.is_some() || !self.view().extras().motion().is_empty() {
-                let ends = update.end.map_or_else(Vec::new, |end| end_vertices(end, indices));
+            let end = update.end.filter(|end| *end != positions);
+            if end.is_some() || !self.view().extras().motion().is_empty() {
+                let ends = end.map_or_else(Vec::new, |end| end_vertices(end, indices));
                 self.update_motion(|motion| motion.set_mesh(first as u32, ends));
             }
         }

@@ -25,10 +25,11 @@ impl LightsView<'_> {
         self.validate_leaves()?;
         self.extras().validate(self.len())?;
         let count = self.extras().profiles().count();
-        let lamps = self.records.iter().filter_map(|record| match Light::of(record, Extras::NONE, self.instances, 0.0) {
-            Light::Lamp(lamp) => lamp.record.profile(),
-            Light::Triangle(_) | Light::Instance(_) | Light::Moving(_) => None,
-        });
+        let lamps =
+            self.records.iter().filter_map(|record| match Light::of(record, Extras::NONE, self.instances, 0.0) {
+                Light::Lamp(lamp) => lamp.record.profile(),
+                Light::Triangle(_) | Light::Instance(_) | Light::Moving(_) => None,
+            });
         for profile in lamps {
             if profile as usize >= count {
                 return Err(Error::bytes("profile of a light", 0, profile, count));

@@ -72,6 +72,14 @@ impl<'a> LightsView<'a> {
     /// Whether the environment shines in through a light.
     #[inline]
     pub(crate) fn is_portal(&self, leaf: LightLeaf) -> bool {
+        match self.still(leaf.top) {
+            Some(triangle) => triangle.is_portal(),
+            None => self.is_other_portal(leaf),
+        }
+    }
+
+    #[inline(never)]
+    fn is_other_portal(&self, leaf: LightLeaf) -> bool {
         match self.placed(leaf) {
             None => self.light(leaf.top).is_portal(),
             Some(triangle) => triangle.is_portal(),
@@ -90,6 +98,14 @@ impl<'a> LightsView<'a> {
     /// Returns the point where a ray crosses a light, if it does. `direction` need not be a unit vector.
     #[inline]
     pub(crate) fn intersect(&self, leaf: LightLeaf, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
+        match self.still(leaf.top) {
+            Some(triangle) => triangle.intersect(origin, direction),
+            None => self.intersect_other(leaf, origin, direction),
+        }
+    }
+
+    #[inline(never)]
+    fn intersect_other(&self, leaf: LightLeaf, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         match self.placed(leaf) {
             None => self.light(leaf.top).intersect(origin, direction),
             Some(triangle) => triangle.intersect(origin, direction),

@@ -4,7 +4,7 @@
 //! those over the whole interval, by the Bernstein coefficients of what changes with a power of the time
 //! ([`geometry`](crate::geometry)), in parts of the interval.
 
-use glam::{Affine3A, DMat3, Vec3};
+use glam::{Affine3A, DMat3, DVec3, Vec3};
 
 use super::bounds::mapped_cone_of;
 use super::{Fault, Instance, InstanceRecord, LARGEST_CONDITION, LARGEST_SCALE, PlacedObject};
@@ -56,52 +56,77 @@ impl InstanceRecord {
 /// at which it cannot.
 fn check_between(at: &impl Fn(f64) -> DMat3, [start, end]: [f64; 2], halvings: u32) -> Result<(), f64> {
     let (first, last) = (at(start), at(end));
-    let determinants = determinants(&first, &last);
-    let sign = determinants[0].signum();
-    let least = determinants.into_iter().fold(f64::INFINITY, |least, coefficient| least.min(sign * coefficient));
+    let sign = determinant_of(&first).signum();
+    let least = determinants(&first, &last).into_iter().fold(f64::INFINITY, |least, det| least.min(sign * det));
     let largest = norm(&first).max(norm(&last));
-    // The inverse is that of the cofactors over the determinant.
     let cofactor = cofactors(&first, &last).iter().fold(0.0f64, |largest, matrix| largest.max(norm(matrix)));
-    let inverse = cofactor / least;
-    // NaN fails.
-    if least > 0.0 && largest * inverse <= LARGEST_CONDITION && inverse <= LARGEST_SCALE {
+    if is_invertible(largest, cofactor, least) {
         return Ok(());
     }
     let middle = 0.5 * (start + end);
-    if halvings == 0 || determinant_of(&at(middle)) * sign <= 0.0 {
+    let matrix = at(middle);
+    let determinant = sign * determinant_of(&matrix);
+    if determinant <= 0.0 {
+        return Err(zero_between(|time| sign * determinant_of(&at(time)), [start, middle]));
+    }
+    let [cofactors, ..] = cofactors(&matrix, &matrix);
+    if halvings == 0 || !is_invertible(norm(&matrix), norm(&cofactors), determinant) {
         return Err(middle);
     }
     check_between(at, [start, middle], halvings - 1)?;
     check_between(at, [middle, end], halvings - 1)
 }
 
+/// Whether a matrix can be inverted well enough, by bounds on the lengths of what it and its cofactors make of unit vectors,
+/// and on the determinant.
+fn is_invertible(largest: f64, cofactor: f64, determinant: f64) -> bool {
+    let inverse = cofactor / determinant;
+    // NaN fails.
+    determinant > 0.0 && largest * inverse <= LARGEST_CONDITION && inverse <= LARGEST_SCALE
+}
+
+/// Returns where a function that is positive at the start of an interval, and not at the end, is zero.
+fn zero_between(of: impl Fn(f64) -> f64, [mut start, mut end]: [f64; 2]) -> f64 {
+    for _ in 0..f32::MANTISSA_DIGITS {
+        let middle = 0.5 * (start + end);
+        *(if of(middle) > 0.0 { &mut start } else { &mut end }) = middle;
+    }
+    end
+}
+
 fn determinant_of(matrix: &DMat3) -> f64 {
     matrix.x_axis.dot(matrix.y_axis.cross(matrix.z_axis))
+}
+
+#[inline(never)]
+fn end_of<'a>(extras: Extras<'a>, number: u32) -> Option<&'a EndColumns> {
+    extras.motion().end_of_instance(number)
+}
+
+#[inline(never)]
+fn columns_between(start: &EndColumns, end: &EndColumns, time: f32) -> [DVec3; 4] {
+    Placement::columns_between(start, end, time.into())
 }
 
 impl<'a> PlacedObject<'a> {
     /// Returns the instance of a number at a time, if it moves.
     #[inline(always)]
     pub(in crate::light) fn moving(self, extras: Extras<'a>, number: u32, time: f32) -> Self {
-        if extras.is_empty() { self } else { self.moving_at(extras, number, time) }
-    }
-
-    #[inline(never)]
-    fn moving_at(self, extras: Extras<'a>, number: u32, time: f32) -> Self {
-        Self { end: extras.motion().end_of_instance(number), time, ..self }
+        let end = if extras.is_empty() { None } else { end_of(extras, number) };
+        Self { end, time, ..self }
     }
 
     /// Returns the map to the world at the time of the instance.
     #[inline]
     pub(super) fn placement(&self) -> Placement {
-        match self.end {
-            None => self.record.placement(),
-            Some(end) => Placement::between(&self.record.columns, end, self.time.into()),
-        }
+        Placement::of_columns(match self.end {
+            None => Placement::exactly(&self.record.columns),
+            Some(end) => columns_between(&self.record.columns, end, self.time),
+        })
     }
 
     fn placement_at(&self, end: &EndColumns, time: f64) -> Placement {
-        Placement::between(&self.record.columns, end, time)
+        Placement::of_columns(Placement::columns_between(&self.record.columns, end, time))
     }
 
     /// Returns the mean over the interval of what depends on the map to the world.
@@ -138,3 +163,6 @@ impl<'a> PlacedObject<'a> {
         Some(widened(all.flatten().reduce(Cone::union)))
     }
 }
+
+#[cfg(test)]
+mod tests;

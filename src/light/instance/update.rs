@@ -26,7 +26,8 @@ impl Lights {
             let record = InstanceRecord::new(&instance, number, current.object, corners)?;
             Ok((number, InstanceRecord { leaf: current.leaf, ..record }, instance.end_columns()))
         };
-        let replaced: Vec<(usize, InstanceRecord, Option<EndColumns>)> = updates.iter().map(replace).collect::<Result<_, _>>()?;
+        let replaced: Vec<(usize, InstanceRecord, Option<EndColumns>)> =
+            updates.iter().map(replace).collect::<Result<_, _>>()?;
         let is_moving = !self.view().extras().motion().is_empty();
         if is_moving || replaced.iter().any(|(_, _, end)| end.is_some()) {
             self.update_motion(|motion| {

@@ -177,7 +177,8 @@ impl LightKind for MovingTriangle<'_> {
             portal: if directional { energy } else { 0.0 },
             two_sided: self.is_two_sided(),
         };
-        let centroids = ends.map(|vertices| vertices.iter().map(|vertex| vertex.as_dvec3()).sum::<DVec3>() * (1.0 / 3.0));
+        let centroids =
+            ends.map(|vertices| vertices.iter().map(|vertex| vertex.as_dvec3()).sum::<DVec3>() * (1.0 / 3.0));
         let within = simpson(|time| {
             let [a, b] = self.at(time).edges();
             (a.length_squared() + b.length_squared() + (b - a).length_squared()) * (1.0 / 36.0)
