@@ -362,11 +362,9 @@ fn star_instances(count: u32) {
     let image = scene.image.as_ref().expect("there is one");
     let texture = Texture::new(image.size, image.size, &image.texels).expect("the image is finite");
     let texture = builder.add_texture(texture.filter(image.filter));
-    let portal = |mesh| {
-        let scenes::LightMesh { positions, uvs, indices, .. } = mesh;
-        Mesh::portal(positions, indices).uvs(uvs).weight(Weight::Texture(texture))
-    };
-    let meshes: Vec<Mesh<'_>> = scene.meshes.iter().map(portal).collect();
+    let weight = Weight::Texture(texture);
+    let meshes: Vec<Mesh<'_>> =
+        scene.meshes.iter().map(|m| Mesh::portal(&m.positions, &m.indices).uvs(&m.uvs).weight(weight)).collect();
     let window = builder.add_object(&meshes).expect("the window is sound");
     let row = f64::from(count).sqrt() as u32;
     for i in 0..count {

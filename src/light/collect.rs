@@ -241,8 +241,17 @@ impl<'a> LightCollection<'a> {
     }
 
     /// Returns a light by its index among those that may emit: first the triangles, then the lamps, then the instances.
+    #[inline]
     pub(crate) fn light(&self, index: u32) -> Light<'_> {
-        let index = index as usize;
+        match self.triangles.get(index as usize) {
+            Some(triangle) if triangle.index_and_flags & LightTriangle::LAMP == 0 => Light::Triangle(triangle),
+            _ => self.other_light(index as usize),
+        }
+    }
+
+    /// Returns a light that is no triangle or that moves.
+    #[inline(never)]
+    fn other_light(&self, index: usize) -> Light<'_> {
         match self.triangles.get(index) {
             Some(triangle) => Light::of(triangle, Extras(&self.packed), &[], 0.0),
             None => match self.lamps.get(index - self.triangles.len()) {

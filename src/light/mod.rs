@@ -437,13 +437,30 @@ impl<'a> LightsView<'a> {
     where
         'a: 'v,
     {
-        match self.light(leaf.top) {
-            Light::Triangle(light) => {
+        match self.still(leaf.top) {
+            Some(light) => {
                 TriangleView::wrapped(light, x, self.illumination, self.cells, environment, LightView::Triangle)
             }
+            None => self.view_of_other(leaf, x, environment),
+        }
+    }
+
+    /// Returns anything but a triangle that stands still as seen from a shading point.
+    #[inline]
+    fn view_of_other<'v>(
+        &self,
+        leaf: LightLeaf,
+        x: &ShadingPoint,
+        environment: Option<&'v EnvironmentView<'v>>,
+    ) -> Option<LightView<'v>>
+    where
+        'a: 'v,
+    {
+        match self.light(leaf.top) {
             Light::Lamp(lamp) => LampView::new(&lamp, x).map(LightView::Lamp),
             Light::Instance(placed) => self.view_within(&placed, leaf, x, environment),
             Light::Moving(moving) => self.view_moving(&moving, x, environment),
+            Light::Triangle(_) => None,
         }
     }
 

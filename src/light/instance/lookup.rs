@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{PlacedObject, PlacedTriangle, records};
-use crate::light::{Light, LightKind, LightLeaf, LightTriangle, LightsView, LocalPoint, NO_LEAF};
+use crate::light::{LightKind, LightLeaf, LightTriangle, LightsView, LocalPoint, NO_LEAF};
 use crate::receiver::ShadingPoint;
 use crate::record::{InstanceId, TriangleId};
 
@@ -43,10 +43,8 @@ impl<'a> LightsView<'a> {
     /// Returns the instance in a leaf; `None` for a light of its own.
     #[inline]
     pub(crate) fn instance(&self, leaf: u32) -> Option<PlacedObject<'a>> {
-        match self.light(leaf) {
-            Light::Instance(placed) => Some(placed),
-            Light::Triangle(_) | Light::Lamp(_) | Light::Moving(_) => None,
-        }
+        let number = self.records[leaf as usize].instance()?;
+        Some(PlacedObject::at(self.instances, number).moving(self.extras(), number, self.time))
     }
 
     /// Returns the leaf of a triangle of an instance; `None` for one that emits nothing or that was never added.
@@ -67,6 +65,19 @@ impl<'a> LightsView<'a> {
         let number = self.records[leaf.top as usize].instance().unwrap_or_default();
         let triangle = placed.object.id(&placed.object.records()[leaf.below().unwrap_or_default() as usize]);
         (triangle, Some(InstanceId(number)))
+    }
+
+    /// Returns the irradiance from the light in a leaf if it has unit radiance, per area of the light
+    /// ([`LightKind::irradiance_per_area`]).
+    #[inline]
+    pub(crate) fn irradiance_per_area(&self, leaf: u32, x: &ShadingPoint) -> f32 {
+        if let Some(triangle) = self.still(leaf) {
+            return triangle.irradiance_per_area(x);
+        }
+        match self.instance(leaf) {
+            Some(placed) => placed.irradiance_per_area(x),
+            None => self.light(leaf).irradiance_per_area(x),
+        }
     }
 
     /// Whether the environment shines in through a light.

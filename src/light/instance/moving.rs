@@ -117,7 +117,7 @@ impl<'a> PlacedObject<'a> {
     }
 
     /// Returns the map to the world at the time of the instance.
-    #[inline]
+    #[inline(always)]
     pub(super) fn placement(&self) -> Placement {
         Placement::of_columns(match self.end {
             None => Placement::exactly(&self.record.columns),
