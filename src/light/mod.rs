@@ -360,11 +360,6 @@ impl<'a> Light<'a> {
         }
     }
 
-    /// Whether the light's vertices move.
-    pub(crate) fn is_moving(&self) -> bool {
-        matches!(self, Self::Moving(_))
-    }
-
     /// Returns what the weight of the light is multiplied by, by the factors of the meshes.
     #[inline]
     fn scale(self, factors: &[f32], meshes: &[u32]) -> f32 {
@@ -443,39 +438,6 @@ impl<'a> LightsView<'a> {
             }
             None => self.view_of_other(leaf, x, environment),
         }
-    }
-
-    /// Returns anything but a triangle that stands still as seen from a shading point.
-    #[inline]
-    fn view_of_other<'v>(
-        &self,
-        leaf: LightLeaf,
-        x: &ShadingPoint,
-        environment: Option<&'v EnvironmentView<'v>>,
-    ) -> Option<LightView<'v>>
-    where
-        'a: 'v,
-    {
-        match self.light(leaf.top) {
-            Light::Lamp(lamp) => LampView::new(&lamp, x).map(LightView::Lamp),
-            Light::Instance(placed) => self.view_within(&placed, leaf, x, environment),
-            Light::Moving(moving) => self.view_moving(&moving, x, environment),
-            Light::Triangle(_) => None,
-        }
-    }
-
-    /// Returns a triangle whose vertices move as seen from a shading point.
-    #[inline(never)]
-    fn view_moving<'v>(
-        &self,
-        moving: &MovingTriangle<'a>,
-        x: &ShadingPoint,
-        environment: Option<&'v EnvironmentView<'v>>,
-    ) -> Option<LightView<'v>>
-    where
-        'a: 'v,
-    {
-        TriangleView::moving(moving, x, self.illumination, self.cells, environment, LightView::Triangle)
     }
 
     /// Returns a triangle of an instance as seen from a shading point.
@@ -561,17 +523,5 @@ impl<'a> LightsView<'a> {
             Some(triangle) => scale_of(self.scales, self.meshes, triangle.index()),
             None => self.scale_of_other(leaf.top),
         }
-    }
-
-    #[inline(never)]
-    fn scale_of_other(&self, leaf: u32) -> f32 {
-        self.light(leaf).scale(self.scales, self.meshes)
-    }
-
-    /// Returns the triangle in a leaf if it stands still, as those in most leaves do; `None` for any other light.
-    #[inline(always)]
-    fn still(&self, leaf: u32) -> Option<&'a LightTriangle> {
-        let record = &self.records[leaf as usize];
-        (record.index_and_flags & LightTriangle::LAMP == 0).then_some(record)
     }
 }

@@ -19,6 +19,7 @@ impl Lights {
     pub(crate) fn update(&mut self, updates: &[MeshUpdate<'_>]) -> Result<(), Error> {
         updates.iter().try_for_each(|update| self.check(update))?;
         updates.iter().for_each(|update| self.apply(update));
+        self.update_ends(updates);
         Ok(())
     }
 
@@ -102,10 +103,24 @@ impl Lights {
         }
     }
 
+    /// Sets where the vertices of changed meshes are at the end of the shutter interval.
+    fn update_ends(&mut self, updates: &[MeshUpdate<'_>]) {
+        if self.view().extras().motion().is_empty() && updates.iter().all(|update| update.end.is_none()) {
+            return;
+        }
+        let ends = |update: &MeshUpdate<'_>| {
+            let (positions, indices) = update.triangles.filter(|(_, indices)| !indices.is_empty())?;
+            let end = update.end.filter(|end| *end != positions);
+            let ends = end.map_or_else(Vec::new, |end| end_vertices(end, indices));
+            Some((self.meshes[update.mesh.0 as usize], ends))
+        };
+        let changed: Vec<_> = updates.iter().filter_map(ends).collect();
+        self.update_motion(|motion| changed.into_iter().for_each(|(first, ends)| motion.set_mesh(first, ends)));
+    }
+
     fn apply(&mut self, update: &MeshUpdate<'_>) {
         let mesh = update.mesh.0 as usize;
         let range = self.range(mesh);
-        let first = range.start;
         if let Some((positions, indices)) = update.triangles {
             for (&leaf, &indices) in self.leaf_of[range].iter().zip(indices) {
                 if let Some(light) = self.records.get_mut(leaf as usize) {
@@ -113,11 +128,6 @@ impl Lights {
                     let end = update.end.map(|end| triangle(end, indices).0.map(Vec3::into));
                     light.mark_motion(end.as_ref());
                 }
-            }
-            let end = update.end.filter(|end| *end != positions);
-            if end.is_some() || !self.view().extras().motion().is_empty() {
-                let ends = end.map_or_else(Vec::new, |end| end_vertices(end, indices));
-                self.update_motion(|motion| motion.set_mesh(first as u32, ends));
             }
         }
         if let Some(scale) = update.scale {

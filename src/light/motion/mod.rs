@@ -6,6 +6,7 @@
 //! hold for the whole interval. What moves is found by the number that it was added with: [`Motion`] is an array of words at
 //! the end of [`Extras`](super::Extras), so that a scene in which nothing moves has none of it, and no walk asks for it.
 
+mod lookup;
 #[cfg(test)]
 mod tests;
 mod triangle;
