@@ -106,6 +106,10 @@ pub(crate) enum ErrorKind {
     OtherObject { instance: usize, object: u32, expected: u32 },
     /// An instance that a sampler does not hold.
     UnknownInstance { instance: usize, instances: usize },
+    /// A mesh that moves, with another number of vertices at the end than at the start.
+    EndCount { mesh: usize, found: usize, vertices: usize },
+    /// A mesh of an object whose vertices move.
+    MotionInObject { object: usize, mesh: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -223,6 +227,15 @@ impl fmt::Display for ErrorKind {
             }
             ErrorKind::UnknownInstance { instance, instances } => {
                 write!(f, "instance {instance} was never added, this sampler has {instances}")
+            }
+            ErrorKind::EndCount { mesh, found, vertices } => {
+                write!(
+                    f,
+                    "mesh {mesh}: {found} vertices at the end of the shutter interval, but {vertices} at its start"
+                )
+            }
+            ErrorKind::MotionInObject { object, mesh } => {
+                write!(f, "object {object}: the vertices of mesh {mesh} move, but only the object's instances can")
             }
             ErrorKind::TooMany { what, count, limit } => write!(f, "{count} {what}, but at most {limit} are possible"),
             ErrorKind::Cancelled => write!(f, "the build was cancelled"),

@@ -61,6 +61,9 @@
 //! What stands in a scene many times is built once: [`add_object`](LightSamplerBuilder::add_object) takes the meshes, and
 //! [`add_instance`](LightSamplerBuilder::add_instance) places them by any affine map ([`Instance`]).
 //!
+//! What moves while the shutter is open says where it is at the end ([`Mesh::moving_to`], [`Instance::moving_to`]), and a shading
+//! point says its time ([`ShadingPoint::at_time`]); all densities are those of that time.
+//!
 //! Photons start with [`LightSampler::emission`]. In participating media, [`LightSampler::along`] chooses a distance along a
 //! ray.
 //!

@@ -116,6 +116,10 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "street-stretched/nee", calls: CALLS, run: || street(Street::Stretched, true) },
     Case { name: "street-flattened/sample", calls: CALLS, run: || street(Street::Flattened, false) },
     Case { name: "street-flattened/nee", calls: CALLS, run: || street(Street::Flattened, true) },
+    Case { name: "street-moving/nee", calls: CALLS, run: || street(Street::Moving, true) },
+    Case { name: "street-moving-triangles/nee", calls: CALLS, run: || street(Street::MovingTriangles, true) },
+    Case { name: "star-instance/nee", calls: CALLS, run: || star_instances(1) },
+    Case { name: "star-10000-instances/nee", calls: CALLS, run: || star_instances(10_000) },
 ];
 
 /// A point of a triangle that no workload has: its density costs what the first call at a shading point finds for all, and
@@ -356,6 +360,36 @@ fn environment_light(call: fn(&LightSampler, &ShadingPoint, [f32; 3]) -> f32) {
     });
 }
 
+/// A clip-mapped window under the captured sky with its sun, or a wall of them: one object.
+fn star_instances(count: u32) {
+    let scene = scenes::scene("star");
+    let points = lit_points(&scene, &lights(&scene));
+    let mut builder =
+        LightSampler::builder().environment(scene.sky.as_ref().expect("there is one").environment.clone());
+    let image = scene.image.as_ref().expect("there is one");
+    let texture = Texture::new(image.size, image.size, &image.texels).expect("the image is finite");
+    let texture = builder.add_texture(texture.filter(image.filter));
+    let weight = Weight::Texture(texture);
+    let meshes: Vec<Mesh<'_>> =
+        scene.meshes.iter().map(|m| Mesh::portal(&m.positions, &m.indices).uvs(&m.uvs).weight(weight)).collect();
+    let window = builder.add_object(&meshes).expect("the window is sound");
+    let row = f64::from(count).sqrt() as u32;
+    for i in 0..count {
+        let [x, z] = [i % row, i / row].map(|k| (k as f32 - (row / 2) as f32) * 2.0);
+        let place = Affine3A::from_translation(Vec3::new(x, 0.0, z));
+        builder.add_instance(Instance::new(window, place)).expect("the place is sound");
+    }
+    let lights = builder.build().expect("the wall is small");
+    let numbers = numbers();
+    measured(|i| {
+        let here = lights.at(&points[i]);
+        if let Some(sample) = here.sample(numbers[i]) {
+            black_box(here.pdf_sample_direction(&sample));
+            black_box(sample);
+        }
+    });
+}
+
 /// How the lamps of a street are passed in.
 #[derive(Clone, Copy, PartialEq)]
 enum Street {
@@ -365,6 +399,10 @@ enum Street {
     Stretched,
     /// The lamps of [`Street::Instances`] as a mesh each.
     Flattened,
+    /// Those of [`Street::Instances`], each of which goes by a little while the shutter is open.
+    Moving,
+    /// The same as a mesh each.
+    MovingTriangles,
 }
 
 /// Four hundred lamps of two hundred triangles, and points between them.
@@ -389,22 +427,26 @@ fn street(kind: Street, with_density: bool) {
         })
         .collect();
     let mut builder = LightSampler::builder();
-    if kind == Street::Flattened {
+    let is_moving = matches!(kind, Street::Moving | Street::MovingTriangles);
+    let way = if is_moving { Vec3::new(0.1, 0.05, 0.0) } else { Vec3::ZERO };
+    if matches!(kind, Street::Flattened | Street::MovingTriangles) {
         for transform in &transforms {
             let moved: Vec<Vec3> = positions.iter().map(|p| transform.transform_point3(*p)).collect();
-            builder.add_mesh(&Mesh::emitter(&moved, &indices)).expect("the lamp is sound");
+            let later: Vec<Vec3> = moved.iter().map(|p| *p + way).collect();
+            builder.add_mesh(&Mesh::emitter(&moved, &indices).moving_to(&later)).expect("the lamp is sound");
         }
     } else {
         let lamp = builder.add_object(&[Mesh::emitter(&positions, &indices)]).expect("the lamp is sound");
         for transform in &transforms {
-            builder.add_instance(Instance::new(lamp, *transform)).expect("the place is sound");
+            let instance = Instance::new(lamp, *transform).moving_to(Affine3A::from_translation(way) * *transform);
+            builder.add_instance(instance).expect("the place is sound");
         }
     }
     let lights = builder.build().expect("the street is small");
     let points: Vec<ShadingPoint> = (0..CALLS)
         .map(|_| {
             let [u, v, w] = pcg.uniform3();
-            ShadingPoint::surface(Vec3::new(38.0 * u, 38.0 * v, 0.5 * w), Vec3::Z)
+            ShadingPoint::surface(Vec3::new(38.0 * u, 38.0 * v, 0.5 * w), Vec3::Z).at_time(w)
         })
         .collect();
     let numbers = numbers();

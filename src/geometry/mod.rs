@@ -3,6 +3,7 @@
 mod aabb;
 mod cone;
 mod horizon;
+mod motion;
 mod placement;
 mod polygon;
 mod triangle;
@@ -10,6 +11,7 @@ mod triangle;
 pub(crate) use aabb::Aabb;
 pub(crate) use cone::{Cone, angle};
 pub(crate) use horizon::{HORIZON_ROUNDING, horizon, is_below};
+pub(crate) use motion::{area_vectors, between, cofactors, determinants};
 pub(crate) use placement::{Placement, norm};
 pub(crate) use polygon::Polygon;
 pub(crate) use triangle::{Triangle, cross_plane, intersect, normal_and_area, subdivision_centers};

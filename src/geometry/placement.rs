@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
+use super::motion::between;
 use crate::math;
 
 /// Rounding granted to a bound on the length of a vector that was mapped. *Proved*: a bound in double precision is off by
@@ -30,7 +31,24 @@ impl Placement {
     /// Returns the map of these columns: three axes, and the image of the origin. They must be invertible.
     #[inline]
     pub(crate) fn new(columns: &[[f32; 3]; 4]) -> Self {
-        let [x, y, z, translation] = columns.map(|column| Vec3::from(column).as_dvec3());
+        Self::of_columns(Self::exactly(columns))
+    }
+
+    /// Returns columns in double precision.
+    #[inline(always)]
+    pub(crate) fn exactly(columns: &[[f32; 3]; 4]) -> [DVec3; 4] {
+        columns.map(|column| Vec3::from(column).as_dvec3())
+    }
+
+    /// Returns the columns between two lists of columns, at this share of the way.
+    pub(crate) fn columns_between(start: &[[f32; 3]; 4], end: &[[f32; 3]; 4], time: f64) -> [DVec3; 4] {
+        let column = |i: usize| between(Vec3::from(start[i]).as_dvec3(), Vec3::from(end[i]).as_dvec3(), time);
+        [column(0), column(1), column(2), column(3)]
+    }
+
+    /// Returns the map of these columns.
+    #[inline(always)]
+    pub(crate) fn of_columns([x, y, z, translation]: [DVec3; 4]) -> Self {
         let linear = DMat3::from_cols(x, y, z);
         // By the cross products of the axes, which are the rows of the inverse times the determinant.
         let determinant = x.dot(y.cross(z));

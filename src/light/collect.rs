@@ -7,8 +7,9 @@ use alloc::vec::Vec;
 use super::distant::{self, DistantRecord};
 use super::extras;
 use super::instance::{self, AddedObject, InstanceRecord, PlacedObject};
-use super::mesh::{Mesh, MeshKind, Sides, Weight, check_triangles};
+use super::mesh::{Mesh, MeshKind, Sides, Weight, check_end, check_triangles};
 use super::meshes::mesh_of;
+use super::motion::{MotionCollection, end_vertices};
 use super::profile::{Profile, ProfileCollection};
 use super::{
     Energies, Extras, Illumination, Lamp, LampLight, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA,
@@ -64,6 +65,8 @@ pub(crate) struct LightCollection<'a> {
     /// Light groups of each.
     pub(super) instance_groups: Vec<u32>,
     pub(super) objects_have_portals: bool,
+    /// What moves while the shutter is open.
+    pub(super) motion: MotionCollection,
 }
 
 /// A texture and the bits of the three uvs: what a tree depends on.
@@ -99,6 +102,7 @@ impl<'a> LightCollection<'a> {
             instances: Vec::new(),
             instance_groups: Vec::new(),
             objects_have_portals: false,
+            motion: MotionCollection::default(),
         }
     }
 
@@ -137,6 +141,9 @@ impl<'a> LightCollection<'a> {
                 self.shared.retain(|_, root| blas::holds(&self.cells, *root));
                 return Err(error);
             }
+        }
+        if let Some(end) = mesh.end.filter(|end| *end != mesh.positions) {
+            self.motion.set_mesh(before.1 as u32, end_vertices(end, mesh.indices));
         }
         self.meshes.push(self.indices.len() as u32);
         self.mesh_groups.push(mesh.groups);
@@ -177,7 +184,7 @@ impl<'a> LightCollection<'a> {
     ///
     /// If there are too many nodes, or if the host has cancelled the build.
     pub(crate) fn build_images(&mut self, progress: &Progress<'_>) -> Result<(), Error> {
-        self.packed = extras::pack(&[], &[], &[], self.profiles.arrays());
+        self.packed = extras::pack(&[], &[], &[], self.profiles.arrays(), &self.motion.pack());
         let trees = core::mem::take(&mut self.images);
         // One image after the other: only few pyramids exist at a time.
         let mut order: Vec<u32> = (0..trees.len() as u32).collect();
@@ -234,15 +241,25 @@ impl<'a> LightCollection<'a> {
     }
 
     /// Returns a light by its index among those that may emit: first the triangles, then the lamps, then the instances.
+    #[inline]
     pub(crate) fn light(&self, index: u32) -> Light<'_> {
-        let index = index as usize;
+        match self.triangles.get(index as usize) {
+            Some(triangle) if triangle.index_and_flags & LightTriangle::LAMP == 0 => Light::Triangle(triangle),
+            _ => self.other_light(index as usize),
+        }
+    }
+
+    /// Returns a light that is no triangle or that moves.
+    #[inline(never)]
+    fn other_light(&self, index: usize) -> Light<'_> {
         match self.triangles.get(index) {
-            Some(triangle) => Light::Triangle(triangle),
+            Some(triangle) => Light::of(triangle, Extras(&self.packed), &[], 0.0),
             None => match self.lamps.get(index - self.triangles.len()) {
                 Some(record) => Light::Lamp(LampLight { record, extras: Extras(&self.packed) }),
                 None => {
-                    let instance = &self.instances[index - self.triangles.len() - self.lamps.len()];
-                    Light::Instance(PlacedObject::new(instance, &self.object_words))
+                    let number = index - self.triangles.len() - self.lamps.len();
+                    let placed = PlacedObject::new(&self.instances[number], &self.object_words);
+                    Light::Instance(placed.moving(Extras(&self.packed), number as u32, 0.0))
                 }
             },
         }
@@ -257,6 +274,7 @@ impl<'a> LightCollection<'a> {
         }
         let groups = |index: u32| match self.light(index) {
             Light::Triangle(triangle) => self.mesh_groups[mesh_of(&self.meshes, triangle.index())],
+            Light::Moving(moving) => self.mesh_groups[mesh_of(&self.meshes, moving.record.index())],
             Light::Lamp(lamp) => self.lamp_groups[lamp.record.number() as usize],
             Light::Instance(_) => self.instance_groups[index as usize - self.triangles.len() - self.lamps.len()],
         };
@@ -317,13 +335,14 @@ impl<'a> LightCollection<'a> {
         let emits = |light: &DistantRecord| light.irradiance() > 0.0;
         let mut distants: Vec<DistantRecord> = self.lamps.iter().filter_map(distant).filter(emits).collect();
         let distant_groups = distant::arrange(&mut distants);
-        let extras = extras::pack(&groups, &distants, &distant_groups, self.profiles.arrays());
+        let extras = extras::pack(&groups, &distants, &distant_groups, self.profiles.arrays(), &self.motion.pack());
         Lights {
             illumination,
             energy: 0.0,
             has_portals,
             has_lamps: leaves.iter().any(|index| (first_lamp..first_instance).contains(index)),
             is_crossed_once: false,
+            time: 0.0,
             records,
             cells: self.cells,
             leaf_of,
@@ -342,6 +361,7 @@ impl<'a> LightCollection<'a> {
             return fail(ErrorKind::TooMany { what: "triangles", count, limit: MAX_LEAVES });
         }
         check_triangles(number, mesh.positions, mesh.indices)?;
+        mesh.end.map_or(Ok(()), |end| check_end(number, vertices, end))?;
         match mesh.weight {
             Weight::Constant(value) if !(0.0..=blas::MAX_AVERAGE).contains(&value) => {
                 fail(ErrorKind::Weight { mesh: number, value, limit: blas::MAX_AVERAGE })
@@ -372,14 +392,16 @@ impl<'a> LightCollection<'a> {
         };
         let two_sided = if mesh.sides == Sides::Two { LightTriangle::TWO_SIDED } else { 0 };
         let portal = if mesh.kind == MeshKind::Portal { LightTriangle::PORTAL } else { 0 };
-        let triangle = LightTriangle {
+        let mut triangle = LightTriangle {
             vertices: indices.map(|index| mesh.positions[index as usize].to_array()),
             root,
             index_and_flags: self.indices.len() as u32 | two_sided | portal,
         };
+        let end = mesh.end.map(|end| indices.map(|index| end[index as usize].to_array()));
+        triangle.mark_motion(end.as_ref());
         if root.average == 0.0 {
             self.indices.push(NO_LEAF);
-        } else if triangle.triangle().normal_and_area().is_none() {
+        } else if triangle.never_has_an_area(end.as_ref()) {
             self.indices.push(NO_AREA);
         } else {
             self.indices.push(self.triangles.len() as u32);

@@ -88,7 +88,10 @@ fn extent(light: &LightTriangle) -> f64 {
 impl Lights {
     /// Finds out whether a ray meets at most one light that shines back along it.
     pub(crate) fn find_crossings(&mut self) {
-        self.is_crossed_once = if self.has_lamps || !self.instances.is_empty() {
+        // What moves may cross what it does not cross at either end.
+        self.is_crossed_once = if !self.view().extras().motion().is_empty() {
+            false
+        } else if self.has_lamps || !self.instances.is_empty() {
             self.is_mixture_crossed_once()
         } else {
             is_crossed_once(&self.records)
@@ -99,10 +102,11 @@ impl Lights {
     fn is_mixture_crossed_once(&self) -> bool {
         let mut triangles = Vec::new();
         for record in &self.records {
-            match Light::of(record, Extras::NONE, &self.instances) {
+            match Light::of(record, Extras::NONE, &self.instances, 0.0) {
                 Light::Triangle(triangle) => triangles.push(*triangle),
                 Light::Lamp(lamp) if lamp.record.has_extent() => return false,
                 Light::Lamp(_) => {}
+                Light::Moving(_) => return false,
                 Light::Instance(placed) => {
                     if triangles.len() + placed.object.len() > MOST_PLACED {
                         return false;

@@ -100,6 +100,10 @@ impl LightsView<'_> {
                 start_on_triangle(light, shape, self.cells, guide, point)
             }
             Light::Lamp(_) => None,
+            Light::Moving(triangle) => {
+                let shape = (triangle.normal_and_area()?, triangle.exactly_relative_to(Vec3::ZERO));
+                start_on_triangle(triangle.record, shape, self.cells, guide, point)
+            }
             Light::Instance(placed) => {
                 let triangle = placed.triangle(leaf.below()?);
                 let shape = (triangle.normal_and_area()?, triangle.exactly_relative_to(Vec3::ZERO));

@@ -74,7 +74,7 @@ impl<'a> Energies<'a> {
     pub(crate) fn may_emit(&self, light: Light<'_>) -> bool {
         match light {
             Light::Instance(placed) => emits(&placed.object, self.mean),
-            Light::Triangle(_) | Light::Lamp(_) => self.energy(light) > 0.0,
+            Light::Triangle(_) | Light::Lamp(_) | Light::Moving(_) => self.energy(light) > 0.0,
         }
     }
 }

@@ -1,4 +1,5 @@
-//! What few scenes have: light groups, profiles and distant lights, in one buffer, so that all others carry one slice more.
+//! What few scenes have: light groups, profiles, distant lights and motion, in one buffer, so that all others carry one slice
+//! more.
 //!
 //! The buffer is empty where a scene has none of them. Otherwise it is a [`Header`] and then the arrays that it counts.
 
@@ -7,6 +8,7 @@ use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 
 use super::distant::{DistantGroup, DistantRecord};
+use super::motion::Motion;
 use super::profile::Profiles;
 use crate::error::Error;
 use crate::receiver::ALL_GROUPS;
@@ -25,6 +27,8 @@ struct Header {
     profile_starts: u32,
     /// Tables of the profiles.
     profile_values: u32,
+    /// What moves. Always the last array, so that it can be replaced by one of another length.
+    motion: u32,
 }
 
 /// Words of a [`Header`].
@@ -44,8 +48,9 @@ pub(super) fn pack(
     distants: &[DistantRecord],
     distant_groups: &[DistantGroup],
     [profile_starts, profile_values]: [&[u32]; 2],
+    motion: &[u32],
 ) -> Vec<u32> {
-    if groups.is_empty() && distants.is_empty() && profile_starts.is_empty() {
+    if groups.is_empty() && distants.is_empty() && profile_starts.is_empty() && motion.is_empty() {
         return Vec::new();
     }
     let header = Header {
@@ -54,6 +59,7 @@ pub(super) fn pack(
         distant_groups: distant_groups.len() as u32,
         profile_starts: profile_starts.len() as u32,
         profile_values: profile_values.len() as u32,
+        motion: motion.len() as u32,
     };
     let arrays = [
         bytemuck::cast_slice(core::slice::from_ref(&header)),
@@ -62,8 +68,27 @@ pub(super) fn pack(
         bytemuck::cast_slice(distant_groups),
         profile_starts,
         profile_values,
+        motion,
     ];
     arrays.concat()
+}
+
+/// Replaces what moves by something else.
+pub(super) fn replace_motion(extras: &mut Vec<u32>, motion: &[u32]) {
+    if extras.is_empty() {
+        *extras = pack(&[], &[], &[], [&[]; 2], motion);
+        return;
+    }
+    let header = Extras(extras).header();
+    extras.truncate(extras.len() - (header.motion as usize).min(extras.len()));
+    let header = Header { motion: motion.len() as u32, ..header };
+    if let Some(place) = extras.get_mut(..HEADER) {
+        place.copy_from_slice(bytemuck::cast_slice(core::slice::from_ref(&header)));
+    }
+    extras.extend_from_slice(motion);
+    if extras.iter().all(|word| *word == 0) {
+        extras.clear();
+    }
 }
 
 /// Replaces the distant lights and their groups by as many others.
@@ -134,11 +159,18 @@ impl<'a> Extras<'a> {
 
     /// Returns the profiles.
     pub(super) fn profiles(self) -> Profiles<'a> {
-        let Header { groups, distants, distant_groups, profile_starts, profile_values } = self.header();
+        let Header { groups, distants, distant_groups, profile_starts, profile_values, .. } = self.header();
         let [starts, values] = [profile_starts, profile_values].map(|count| count as usize);
         let before = groups as usize + distants as usize * DISTANT + distant_groups as usize * DISTANT_GROUP;
         let values = bytemuck::cast_slice(self.words(before + starts, values));
         Profiles { starts: self.words(before, starts), values }
+    }
+
+    /// Returns what moves.
+    #[inline]
+    pub(crate) fn motion(self) -> Motion<'a> {
+        let start = self.0.len().saturating_sub(self.header().motion as usize);
+        Motion(self.0.get(start..).unwrap_or(&[]))
     }
 
     /// Checks that the arrays are where the header says, and what they hold. `leaves` is the number of lights in the tree.
@@ -146,22 +178,24 @@ impl<'a> Extras<'a> {
         if self.is_empty() {
             return Ok(());
         }
-        let Header { groups, distants, distant_groups, profile_starts, profile_values } = self.header();
+        let Header { groups, distants, distant_groups, profile_starts, profile_values, motion } = self.header();
         let counts = [
             (groups, 1),
             (distants, DISTANT),
             (distant_groups, DISTANT_GROUP),
             (profile_starts, 1),
             (profile_values, 1),
+            (motion, 1),
         ];
         let words = counts.iter().fold(HEADER as u64, |sum, (count, size)| sum + u64::from(*count) * *size as u64);
         if words != self.0.len() as u64 {
-            return Err(Error::bytes("length of groups, profiles and distant lights", 0, self.0.len(), words));
+            return Err(Error::bytes("length of groups, profiles, distant lights and motion", 0, self.0.len(), words));
         }
         if groups > 0 {
             Error::unless_equal("number of light groups", groups as usize, leaves + 1)?;
         }
         super::distant::validate(self.distants(), self.distant_groups())?;
+        self.motion().validate()?;
         self.profiles().validate()
     }
 }

@@ -41,6 +41,8 @@ pub(super) enum MeshKind {
 pub struct Mesh<'a> {
     pub(super) kind: MeshKind,
     pub(super) positions: &'a [Vec3],
+    /// Positions at the end of the shutter interval; `None` for a mesh that stands still.
+    pub(super) end: Option<&'a [Vec3]>,
     pub(super) indices: &'a [[u32; 3]],
     pub(super) uvs: &'a [Vec2],
     pub(super) weight: Weight,
@@ -54,6 +56,7 @@ impl core::fmt::Debug for Mesh<'_> {
         f.debug_struct("Mesh")
             .field("kind", &self.kind)
             .field("positions", &self.positions.len())
+            .field("end", &self.end.map(<[Vec3]>::len))
             .field("indices", &self.indices.len())
             .field("uvs", &self.uvs.len())
             .field("weight", &self.weight)
@@ -79,12 +82,24 @@ impl<'a> Mesh<'a> {
         Self {
             kind,
             positions,
+            end: None,
             indices,
             uvs: &[],
             weight: Weight::Constant(1.0),
             sides: Sides::One,
             groups: ALL_GROUPS,
         }
+    }
+
+    /// Makes the vertices move while the shutter is open: from their positions at its start, the time 0, along straight lines to
+    /// these at its end, the time 1, one a vertex.
+    ///
+    /// Samples and densities are those of the time of the shading point ([`ShadingPoint::at_time`](crate::ShadingPoint::at_time)),
+    /// and exact at each. A triangle that has no area at some time sends nothing then. Texture coordinates and weights do not
+    /// change.
+    pub const fn moving_to(mut self, end: &'a [Vec3]) -> Self {
+        self.end = Some(end);
+        self
     }
 
     /// Sets what guides the density.
@@ -119,6 +134,8 @@ impl<'a> Mesh<'a> {
 pub struct MeshUpdate<'a> {
     pub(super) mesh: MeshId,
     pub(super) triangles: Option<(&'a [Vec3], &'a [[u32; 3]])>,
+    /// Positions at the end of the shutter interval; `None` for a mesh that stands still.
+    pub(super) end: Option<&'a [Vec3]>,
     pub(super) scale: Option<f32>,
 }
 
@@ -136,13 +153,20 @@ impl core::fmt::Debug for MeshUpdate<'_> {
 impl<'a> MeshUpdate<'a> {
     /// Returns an update that does not change the mesh yet.
     pub const fn new(mesh: MeshId) -> Self {
-        Self { mesh, triangles: None, scale: None }
+        Self { mesh, triangles: None, end: None, scale: None }
     }
 
     /// Moves the vertices. There must be as many triangles as the mesh was added with, in the same order; they keep
-    /// their texture coordinates.
+    /// their texture coordinates. A mesh that was [moving](Mesh::moving_to) stands still from then on.
     pub const fn moved(mut self, positions: &'a [Vec3], indices: &'a [[u32; 3]]) -> Self {
-        self.triangles = Some((positions, indices));
+        (self.triangles, self.end) = (Some((positions, indices)), None);
+        self
+    }
+
+    /// Moves the vertices as [`Self::moved`] does, to where they are at the start of the shutter interval, and makes them move to
+    /// others at its end ([`Mesh::moving_to`]).
+    pub const fn moving(mut self, positions: &'a [Vec3], end: &'a [Vec3], indices: &'a [[u32; 3]]) -> Self {
+        (self.triangles, self.end) = (Some((positions, indices)), Some(end));
         self
     }
 
@@ -152,6 +176,14 @@ impl<'a> MeshUpdate<'a> {
         self.scale = Some(factor);
         self
     }
+}
+
+/// Checks that there are as many positions at the end of the shutter interval as at its start, and all of them.
+pub(super) fn check_end(mesh: usize, vertices: usize, end: &[Vec3]) -> Result<(), Error> {
+    if end.len() != vertices {
+        return Err(Error(ErrorKind::EndCount { mesh, found: end.len(), vertices }));
+    }
+    check_triangles(mesh, end, &[])
 }
 
 /// Checks that all positions are finite and small enough, and that every index has one.

@@ -18,6 +18,7 @@ mod leaf;
 mod linear_density;
 mod mesh;
 mod meshes;
+mod motion;
 mod profile;
 mod spherical_grid;
 mod triangle;
@@ -52,6 +53,7 @@ use lamp::{LampLight, LampRecord};
 pub(crate) use leaf::LightLeaf;
 pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
+pub(crate) use motion::MovingTriangle;
 pub use profile::Profile;
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
 pub(crate) use triangle_view::TriangleView;
@@ -78,6 +80,8 @@ buffers! {
         has_lamps: bool,
         /// Whether a ray is known to meet at most one light that shines back along it.
         is_crossed_once: bool,
+        /// Time in the shutter interval, from 0 to 1, at which lights are asked for.
+        time: f32,
     }
     buffers {
         /// Triangles, and lamps in records of the same size, in the order of the tree's leaves.
@@ -90,8 +94,8 @@ buffers! {
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
-        /// Light groups, profiles and distant lights: see [`Extras`].
-        extras: u32 = b"XTRA" version 1,
+        /// Light groups, profiles, distant lights and what moves: see [`Extras`].
+        extras: u32 = b"XTRA" version 2,
         /// Instances and the objects that they place, as words (see [`instance`]). Empty without instances.
         instances: u32 = b"INST" version 1,
     }
@@ -106,6 +110,8 @@ pub(crate) enum Light<'a> {
     Lamp(LampLight<'a>),
     /// An object in its place.
     Instance(PlacedObject<'a>),
+    /// A triangle whose vertices move, at a time.
+    Moving(MovingTriangle<'a>),
 }
 
 /// A light of any kind as seen from a shading point.
@@ -231,6 +237,7 @@ macro_rules! dispatch {
             Light::Triangle($kind) => $call,
             Light::Lamp($kind) => $call,
             Light::Instance($kind) => $call,
+            Light::Moving($kind) => $call,
         }
     };
     ($enum:ident, $light:expr, $kind:ident => $call:expr) => {
@@ -329,23 +336,26 @@ impl LightView<'_> {
 }
 
 impl<'a> Light<'a> {
-    /// Returns the light of a record.
+    /// Returns the light of a record at a time.
     #[inline(always)]
-    fn of(record: &'a LightTriangle, extras: Extras<'a>, instances: &'a [u32]) -> Self {
+    fn of(record: &'a LightTriangle, extras: Extras<'a>, instances: &'a [u32], time: f32) -> Self {
         if record.index_and_flags & LightTriangle::LAMP == 0 {
             Light::Triangle(record)
         } else if let Some(instance) = record.instance() {
-            Light::Instance(PlacedObject::at(instances, instance))
+            Light::Instance(PlacedObject::at(instances, instance).moving(extras, instance, time))
+        } else if record.index_and_flags & LightTriangle::MOVING != 0 {
+            Light::Moving(MovingTriangle::new(record, extras.motion(), time))
         } else {
             Light::Lamp(LampLight { record: bytemuck::cast_ref(record), extras })
         }
     }
 
-    /// Returns the triangle; `None` for anything else.
+    /// Returns the record of the triangle, wherever it moves; `None` for anything else.
     #[inline(always)]
     fn triangle(self) -> Option<&'a LightTriangle> {
         match self {
             Self::Triangle(triangle) => Some(triangle),
+            Self::Moving(moving) => Some(moving.record),
             Self::Lamp(_) | Self::Instance(_) => None,
         }
     }
@@ -355,6 +365,7 @@ impl<'a> Light<'a> {
     fn scale(self, factors: &[f32], meshes: &[u32]) -> f32 {
         match self {
             Self::Triangle(triangle) => scale_of(factors, meshes, triangle.index()),
+            Self::Moving(moving) => scale_of(factors, meshes, moving.record.index()),
             Self::Lamp(_) => 1.0,
             Self::Instance(placed) => placed.weight(),
         }
@@ -383,7 +394,7 @@ impl<'a> LightsView<'a> {
     /// Returns the light in a leaf.
     #[inline(always)]
     pub(crate) fn light(&self, leaf: u32) -> Light<'a> {
-        Light::of(&self.records[leaf as usize], self.extras(), self.instances)
+        Light::of(&self.records[leaf as usize], self.extras(), self.instances, self.time)
     }
 
     /// Returns what few scenes have.
@@ -394,8 +405,13 @@ impl<'a> LightsView<'a> {
 
     /// Returns a portal's vertices, and whether it has two sides; `None` for any other light.
     pub(crate) fn portal(&self, leaf: u32) -> Option<([Vec3; 3], bool)> {
-        let triangle = self.light(leaf).triangle().filter(|triangle| triangle.is_portal())?;
-        Some((triangle.triangle().0, triangle.is_two_sided()))
+        let light = self.light(leaf);
+        let triangle = light.triangle().filter(|triangle| triangle.is_portal())?;
+        let vertices = match light {
+            Light::Moving(moving) => moving.exactly_relative_to(Vec3::ZERO).map(|vertex| vertex.as_vec3()),
+            _ => triangle.triangle().0,
+        };
+        Some((vertices, triangle.is_two_sided()))
     }
 
     /// Fetches the memory of the light in a leaf, so that a later look at it does not wait.
@@ -416,12 +432,11 @@ impl<'a> LightsView<'a> {
     where
         'a: 'v,
     {
-        match self.light(leaf.top) {
-            Light::Triangle(light) => {
+        match self.still(leaf.top) {
+            Some(light) => {
                 TriangleView::wrapped(light, x, self.illumination, self.cells, environment, LightView::Triangle)
             }
-            Light::Lamp(lamp) => LampView::new(&lamp, x).map(LightView::Lamp),
-            Light::Instance(placed) => self.view_within(&placed, leaf, x, environment),
+            None => self.view_of_other(leaf, x, environment),
         }
     }
 
@@ -478,6 +493,7 @@ impl<'a> LightsView<'a> {
     pub(crate) fn sampled(&self, LightPoint { leaf, point }: LightPoint) -> SampledLight {
         let (triangle, instance) = match self.light(leaf.top) {
             Light::Triangle(triangle) => (self.id(triangle), None),
+            Light::Moving(moving) => (self.id(moving.record), None),
             Light::Lamp(lamp) => return lamp.record.sampled(),
             Light::Instance(placed) => self.id_within(leaf, &placed),
         };
@@ -503,6 +519,9 @@ impl<'a> LightsView<'a> {
     /// Returns what the weight of a light is multiplied by.
     #[inline]
     pub(crate) fn scale(&self, leaf: LightLeaf) -> f32 {
-        self.light(leaf.top).scale(self.scales, self.meshes)
+        match self.still(leaf.top) {
+            Some(triangle) => scale_of(self.scales, self.meshes, triangle.index()),
+            None => self.scale_of_other(leaf.top),
+        }
     }
 }

@@ -25,7 +25,7 @@ pub(crate) struct LightTriangle {
     /// The tree over its texture.
     pub(crate) root: Root,
     /// Number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`]. With [`Self::LAMP`], all of
-    /// this is the record of a lamp.
+    /// this is the record of a lamp, but with [`Self::MOVING`] as well, that of a triangle whose vertices move.
     pub(crate) index_and_flags: u32,
 }
 
@@ -38,6 +38,8 @@ impl LightTriangle {
     pub(crate) const PORTAL: u32 = 1 << 30;
     /// Marks the record of a lamp, which is as large as that of a triangle. *Format*: numbers of lights stay below it.
     pub(crate) const LAMP: u32 = 1 << 29;
+    /// Marks, together with [`Self::LAMP`], a triangle whose vertices move. *Format*: numbers of lights stay below it.
+    pub(crate) const MOVING: u32 = 1 << 28;
 
     #[inline]
     pub(crate) fn triangle(&self) -> Triangle {
@@ -47,7 +49,7 @@ impl LightTriangle {
     /// Returns the triangle's number among all that were added.
     #[inline]
     pub(super) fn index(&self) -> u32 {
-        self.index_and_flags & !(Self::TWO_SIDED | Self::PORTAL)
+        self.index_and_flags & (Self::MOVING - 1)
     }
 
     /// Whether the numbers, which may come from outside, are those of a triangle.

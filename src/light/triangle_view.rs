@@ -7,7 +7,9 @@ use glam::{DVec3, Vec3};
 use super::cell_kernel::CellDescent;
 use super::linear_density::LinearDensity;
 use super::spherical_grid::{GridCell, SphericalGrid};
-use super::{DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind, LocalPoint, PlacedTriangle};
+use super::{
+    DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind, LocalPoint, MovingTriangle, PlacedTriangle,
+};
 use crate::blas::{CellNode, Draw, Follow, Guide, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{DirectionCone, EnvironmentView};
 use crate::geometry;
@@ -108,6 +110,21 @@ impl<'a> TriangleView<'a> {
         // The order of the vertices is the object's own, whichever way it runs around the front.
         let turn = if triangle.is_mirrored() { -1.0 } else { 1.0 };
         let wrap = |view: Self| wrap(Self { determinant: turn * view.determinant, ..view });
+        Self::of_vertices(triangle.record, relative, front, x, illumination, cells, environment, wrap)
+    }
+
+    /// Returns the view of a triangle at its time.
+    pub(super) fn moving<V>(
+        triangle: &MovingTriangle<'_>,
+        x: &ShadingPoint,
+        illumination: Illumination,
+        cells: &'a [CellNode],
+        environment: Option<&'a EnvironmentView<'a>>,
+        wrap: impl FnOnce(Self) -> V,
+    ) -> Option<V> {
+        let exact = triangle.exactly_relative_to(x.position);
+        let relative = (exact, exact.map(|vertex| vertex.as_vec3()));
+        let front = triangle.double_area_vector();
         Self::of_vertices(triangle.record, relative, front, x, illumination, cells, environment, wrap)
     }
 

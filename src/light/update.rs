@@ -6,7 +6,8 @@ use glam::Vec3;
 
 use super::distant::{self, DistantRecord};
 use super::extras;
-use super::mesh::{MeshUpdate, check_triangles};
+use super::mesh::{MeshUpdate, check_end, check_triangles};
+use super::motion::{end_vertices, has_area_between};
 use super::{Lamp, LampRecord, Lights, NO_AREA};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
@@ -18,6 +19,7 @@ impl Lights {
     pub(crate) fn update(&mut self, updates: &[MeshUpdate<'_>]) -> Result<(), Error> {
         updates.iter().try_for_each(|update| self.check(update))?;
         updates.iter().for_each(|update| self.apply(update));
+        self.update_ends(updates);
         Ok(())
     }
 
@@ -82,9 +84,12 @@ impl Lights {
                 return Err(Error(ErrorKind::TriangleCount { mesh, found: indices.len(), expected: leaves.len() }));
             }
             check_triangles(mesh, positions, indices)?;
-            let revived = |&(&leaf, indices): &(&u32, &[u32; 3])| {
-                leaf == NO_AREA && triangle(positions, *indices).normal_and_area().is_some()
+            update.end.map_or(Ok(()), |end| check_end(mesh, positions.len(), end))?;
+            let has_area = |&indices: &[u32; 3]| match update.end {
+                None => triangle(positions, indices).normal_and_area().is_some(),
+                Some(end) => has_area_between(positions, end, indices),
             };
+            let revived = |&(&leaf, indices): &(&u32, &[u32; 3])| leaf == NO_AREA && has_area(indices);
             if let Some(triangle) = leaves.iter().zip(indices).position(|pair| revived(&pair)) {
                 return Err(Error(ErrorKind::Revived { mesh, triangle }));
             }
@@ -98,6 +103,21 @@ impl Lights {
         }
     }
 
+    /// Sets where the vertices of changed meshes are at the end of the shutter interval.
+    fn update_ends(&mut self, updates: &[MeshUpdate<'_>]) {
+        if self.view().extras().motion().is_empty() && updates.iter().all(|update| update.end.is_none()) {
+            return;
+        }
+        let ends = |update: &MeshUpdate<'_>| {
+            let (positions, indices) = update.triangles.filter(|(_, indices)| !indices.is_empty())?;
+            let end = update.end.filter(|end| *end != positions);
+            let ends = end.map_or_else(Vec::new, |end| end_vertices(end, indices));
+            Some((self.meshes[update.mesh.0 as usize], ends))
+        };
+        let changed: Vec<_> = updates.iter().filter_map(ends).collect();
+        self.update_motion(|motion| changed.into_iter().for_each(|(first, ends)| motion.set_mesh(first, ends)));
+    }
+
     fn apply(&mut self, update: &MeshUpdate<'_>) {
         let mesh = update.mesh.0 as usize;
         let range = self.range(mesh);
@@ -105,6 +125,8 @@ impl Lights {
             for (&leaf, &indices) in self.leaf_of[range].iter().zip(indices) {
                 if let Some(light) = self.records.get_mut(leaf as usize) {
                     light.vertices = triangle(positions, indices).0.map(Vec3::into);
+                    let end = update.end.map(|end| triangle(end, indices).0.map(Vec3::into));
+                    light.mark_motion(end.as_ref());
                 }
             }
         }

@@ -17,7 +17,7 @@ impl LightsView<'_> {
         if let Some((leaf, number)) = instances().find(|instance| !is_instance(instance)) {
             return Err(Error::bytes("instance of a leaf", leaf as usize, number, self.instances.len()));
         }
-        let triangle = |record| Light::of(record, Extras::NONE, self.instances).triangle();
+        let triangle = |record| Light::of(record, Extras::NONE, self.instances, 0.0).triangle();
         let roots: Vec<blas::Root> = self.records.iter().filter_map(triangle).map(|triangle| triangle.root).collect();
         let lamps = self.records.len() - roots.len() - instances().count();
         Error::unless_equal("mark of lamps", self.has_lamps.into(), (lamps > 0).into())?;
@@ -25,10 +25,11 @@ impl LightsView<'_> {
         self.validate_leaves()?;
         self.extras().validate(self.len())?;
         let count = self.extras().profiles().count();
-        let lamps = self.records.iter().filter_map(|record| match Light::of(record, Extras::NONE, self.instances) {
-            Light::Lamp(lamp) => lamp.record.profile(),
-            Light::Triangle(_) | Light::Instance(_) => None,
-        });
+        let lamps =
+            self.records.iter().filter_map(|record| match Light::of(record, Extras::NONE, self.instances, 0.0) {
+                Light::Lamp(lamp) => lamp.record.profile(),
+                Light::Triangle(_) | Light::Instance(_) | Light::Moving(_) => None,
+            });
         for profile in lamps {
             if profile as usize >= count {
                 return Err(Error::bytes("profile of a light", 0, profile, count));
@@ -60,6 +61,10 @@ impl LightsView<'_> {
                 Some(triangle.index()).filter(|&index| triangle.is_valid() && index < lamp_start)
             }
             Light::Lamp(lamp) => lamp_start.checked_add(lamp.record.number()).filter(|_| lamp.record.is_valid()),
+            Light::Moving(moving) => {
+                let triangle = moving.record;
+                Some(triangle.index()).filter(|&index| triangle.is_valid() && index < lamp_start)
+            }
             Light::Instance(_) => None,
         };
         let is_single = |&leaf: &u32| self.instance(leaf).is_none();

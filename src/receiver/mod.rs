@@ -18,7 +18,7 @@ mod volume;
 
 use glam::Vec3;
 
-use crate::math::at_least;
+use crate::math::{at_least, at_most};
 pub use effort::Effort;
 pub use glossy::Glossy;
 pub(crate) use lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
@@ -57,6 +57,8 @@ pub struct ShadingPoint {
     pub groups: u32,
     /// How much a call may do to follow the light. [`Effort::Full`] by default.
     pub effort: Effort,
+    /// Time in the shutter interval.
+    pub(crate) time: f32,
 }
 
 /// All light groups. *Format.*
@@ -105,7 +107,7 @@ impl ShadingPoint {
             Receiver::Scattering(medium) if !medium.has_lobe() => Receiver::Volume,
             receiver @ (Receiver::Glossy(_) | Receiver::Scattering(_)) => receiver,
         };
-        Self { position, receiver, groups: ALL_GROUPS, effort: Effort::Full }
+        Self { position, receiver, groups: ALL_GROUPS, effort: Effort::Full, time: 0.0 }
     }
 
     /// Sets the light groups that the point receives, a set of bits. All by default.
@@ -125,24 +127,53 @@ impl ShadingPoint {
         self
     }
 
+    /// Sets the time at which light is gathered, in the shutter interval from 0 to 1; 0 until this sets it, and for NaN. A time
+    /// outside of the interval counts as its nearer end.
+    ///
+    /// It matters only where lights move: [`Mesh::moving_to`](crate::Mesh::moving_to) and
+    /// [`Instance::moving_to`](crate::Instance::moving_to).
+    #[must_use]
+    pub fn at_time(mut self, time: f32) -> Self {
+        self.time = shutter_time(time);
+        self
+    }
+
+    /// Returns the time at which light is gathered, in [0, 1].
+    #[must_use]
+    pub const fn time(&self) -> f32 {
+        self.time
+    }
+
     /// Returns a point on an opaque surface. `normal` is a unit vector to the side that light is gathered from; see
     /// [`Self::new`] for other lengths.
     #[must_use]
     pub fn surface(position: Vec3, normal: Vec3) -> Self {
-        Self { position, receiver: Receiver::Surface(unit(normal)), groups: ALL_GROUPS, effort: Effort::Full }
+        Self {
+            position,
+            receiver: Receiver::Surface(unit(normal)),
+            groups: ALL_GROUPS,
+            effort: Effort::Full,
+            time: 0.0,
+        }
     }
 
     /// Returns a point on a surface that gathers light from both sides. `normal` is a unit vector; see [`Self::new`] for
     /// other lengths.
     #[must_use]
     pub fn transmissive(position: Vec3, normal: Vec3) -> Self {
-        Self { position, receiver: Receiver::Transmissive(unit(normal)), groups: ALL_GROUPS, effort: Effort::Full }
+        Self {
+            position,
+            receiver: Receiver::Transmissive(unit(normal)),
+            groups: ALL_GROUPS,
+            effort: Effort::Full,
+            time: 0.0,
+        }
     }
 
     /// Returns a point in a participating medium.
     #[must_use]
     pub const fn volume(position: Vec3) -> Self {
-        Self { position, receiver: Receiver::Volume, groups: ALL_GROUPS, effort: Effort::Full }
+        Self { position, receiver: Receiver::Volume, groups: ALL_GROUPS, effort: Effort::Full, time: 0.0 }
     }
 
     /// Returns a point on an opaque surface with a glossy lobe.
@@ -185,6 +216,11 @@ impl ShadingPoint {
     pub(crate) fn lanes<L: Lobe>(&self, lobe: L) -> ReceiverLanes<L> {
         self.receiver.lanes(self.position).with_lobe(lobe)
     }
+}
+
+/// Returns a time of the shutter interval: the nearer end for one outside of it, and the start for NaN.
+pub(crate) fn shutter_time(time: f32) -> f32 {
+    at_most(at_least(time, 0.0), 1.0)
 }
 
 /// A normal of unit length, untouched if it has that length already.

@@ -175,7 +175,8 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// If a vertex is not finite or has a coordinate above 1e9, an index has no vertex, the weight is NaN, negative
     /// or above 1e30, or it is a texture of another builder or one without as many uvs as vertices; if the bounds of a
-    /// [`Procedural`] are not finite, negative or in the wrong order, or its weight is not within them.
+    /// [`Procedural`] are not finite, negative or in the wrong order, or its weight is not within them; or if a mesh that
+    /// [moves](Mesh::moving_to) has another number of vertices at the end.
     pub fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<MeshId, Error> {
         self.collection.add_mesh(mesh)
     }
@@ -238,7 +239,7 @@ impl<'a> LightSamplerBuilder<'a> {
     /// # Errors
     ///
     /// If there is no triangle, [`Self::add_mesh`] would refuse one of the meshes, or one of them has
-    /// [light groups](Mesh::groups): an instance is in groups as a whole.
+    /// [light groups](Mesh::groups) or [moves](Mesh::moving_to): an instance is in groups, and moves, as a whole.
     pub fn add_object(&mut self, meshes: &[Mesh<'_>]) -> Result<ObjectId, Error> {
         self.collection.add_object(meshes)
     }
@@ -271,7 +272,8 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// If there is no such object; if an element of the transform is not finite, its longest axis is more than 1e6 times as
     /// long as its shortest, or a length is above 1e12 or below 1e-12, so that it cannot be inverted; if it moves a corner
-    /// of the object's box to a coordinate above 1e9; or if the factor of the weights is NaN, negative or above 1e30.
+    /// of the object's box to a coordinate above 1e9; if any of this holds at some time of an instance that
+    /// [moves](Instance::moving_to); or if the factor of the weights is NaN, negative or above 1e30.
     pub fn add_instance(&mut self, instance: Instance) -> Result<InstanceId, Error> {
         self.collection.add_instance(&instance)
     }

@@ -116,6 +116,7 @@ impl<'a> LightSamplerView<'a> {
             has_portals != 0,
             has_lamps != 0,
             is_crossed_once != 0,
+            0.0,
         )?;
         let environment = EnvironmentView::from_all_sections(&mut sections)?;
         let sky = if has_sky == 0 { None } else { Some(take_regions(&mut sections)?) };

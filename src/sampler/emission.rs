@@ -13,6 +13,7 @@ use super::lights::LightSamplerView;
 use crate::env::DirectionDistribution;
 use crate::light::{EmissionStart, EmittedRay, LightKind, LightLeaf, LightPoint, LocalPoint, PlacedObject};
 use crate::math;
+use crate::receiver::shutter_time;
 use crate::record::{Hit, LightId, SampledLight};
 use crate::technique::LightScene;
 use crate::tlas::{Beam, Outgoing};
@@ -103,6 +104,15 @@ impl<'a> Emission<'a> {
         let total = f64::from(diffuse) + f64::from(through);
         let share = |power: f32| if power > 0.0 { f64::from(power) / total } else { 0.0 };
         Self { scene, directions, shares: [share(diffuse), share(through)], distant: None }
+    }
+
+    /// Sets the time at which light leaves, in the shutter interval from 0 to 1; 0 until this sets it, and for NaN. A time outside
+    /// of the interval counts as its nearer end. It matters only where lights move, and costs nothing: an [`Emission`] can be
+    /// copied for each photon's time.
+    #[must_use]
+    pub fn at_time(mut self, time: f32) -> Self {
+        self.scene.lights.time = shutter_time(time);
+        self
     }
 
     /// Makes distant lights send photons as well: into a ball that holds all of the host's scene. Each starts in a disk that
@@ -335,7 +345,8 @@ fn outgoing_of_one(scene: &LightScene<'_>, outgoing: &Outgoing) -> f32 {
         Outgoing::Diffuse => f32::from(u8::from(!is_directional)),
         Outgoing::Beam(beam) if is_directional || !beam.portals_apart => {
             let (bounds, moments) = light.bounds(false, |_| 1.0);
-            beam.projection(bounds.normals.axis, [0.0, 1.0], moments.normal, bounds.two_sided)
+            let cone = if light.is_moving() { math::sin_cos(bounds.normals.theta).into() } else { [0.0, 1.0] };
+            beam.projection(bounds.normals.axis, cone, moments.normal, bounds.two_sided)
         }
         Outgoing::Beam(_) => 0.0,
     }

@@ -8,7 +8,7 @@ use super::emission::Emission;
 use super::point::PointSampler;
 use crate::env::{Environment, EnvironmentView, RegionMoments};
 use crate::error::Error;
-use crate::light::Lights;
+use crate::light::{Lights, LightsView};
 use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
 use crate::technique::{LightScene, Viewpoint};
@@ -84,7 +84,7 @@ impl LightSampler {
         PointSampler::new(Viewpoint {
             scene: LightScene {
                 tlas: self.tlas.view(),
-                lights: self.lights.view(),
+                lights: LightsView { time: x.time, ..self.lights.view() },
                 environment: self.environment.as_view(),
                 sky: self.sky.as_deref(),
             },
@@ -142,7 +142,11 @@ impl<'a> LightSamplerView<'a> {
     /// Returns the lights as seen from a shading point.
     #[inline(always)]
     pub fn at(&self, x: &ShadingPoint) -> PointSampler<'a> {
-        PointSampler::new(Viewpoint { scene: self.scene, x: *x, visibility: self.region(x) })
+        PointSampler::new(Viewpoint {
+            scene: LightScene { lights: LightsView { time: x.time, ..self.scene.lights }, ..self.scene },
+            x: *x,
+            visibility: self.region(x),
+        })
     }
 
     /// Returns the environment, for its own sampling.

@@ -21,7 +21,7 @@ impl LightSampler {
     /// # Errors
     ///
     /// If there is no such mesh, it had another number of triangles, a vertex is not finite or has a coordinate above
-    /// 1e9, an index has no vertex, a factor or a weight multiplied by it is NaN, negative or above 1e30, or a triangle
+    /// 1e9, there are not as many vertices at the end of the shutter interval, an index has no vertex, a factor or a weight multiplied by it is NaN, negative or above 1e30, or a triangle
     /// without area has become one with an area.
     pub fn refit(&mut self, updates: &[MeshUpdate<'_>]) -> Result<(), Error> {
         self.lights.update(updates)?;

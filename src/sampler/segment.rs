@@ -5,9 +5,10 @@ use glam::Vec3;
 use super::finite::{to_finite, to_positive};
 use super::lights::{LightSampler, LightSamplerView};
 use super::point::PointSampler;
-use crate::receiver::{ALL_GROUPS, Receiver, ShadingPoint};
+use crate::light::LightsView;
+use crate::receiver::{ALL_GROUPS, Receiver, ShadingPoint, shutter_time};
 use crate::record::LightSample;
-use crate::technique::{Distances, MediumSegment};
+use crate::technique::{Distances, LightScene, MediumSegment};
 use crate::tlas::Stretch;
 use crate::warp::{Variate, seed};
 
@@ -32,13 +33,15 @@ pub struct RaySegment {
     pub receiver: Receiver,
     /// Light groups that the points receive: see [`ShadingPoint::with_groups`].
     pub groups: u32,
+    /// Time in the shutter interval.
+    time: f32,
 }
 
 impl RaySegment {
     /// Returns a stretch of a ray from `origin` along `direction`, a vector of any length, in an isotropic medium.
     pub fn new(origin: Vec3, direction: Vec3, length: f32, extinction: f32) -> Self {
         let direction = direction.as_dvec3().normalize_or_zero().as_vec3();
-        Self { origin, direction, length, extinction, receiver: Receiver::Volume, groups: ALL_GROUPS }
+        Self { origin, direction, length, extinction, receiver: Receiver::Volume, groups: ALL_GROUPS, time: 0.0 }
     }
 
     /// Sets how directions are weighted at the points of the stretch.
@@ -53,10 +56,17 @@ impl RaySegment {
         self
     }
 
+    /// Sets the time at which light is gathered along the segment: see [`ShadingPoint::at_time`].
+    pub fn at_time(mut self, time: f32) -> Self {
+        self.time = shutter_time(time);
+        self
+    }
+
     /// Returns the shading point at a distance.
     #[must_use]
     pub fn point(&self, distance: f32) -> ShadingPoint {
-        ShadingPoint::new(self.origin + distance * self.direction, self.receiver).with_groups(self.groups)
+        let x = ShadingPoint::new(self.origin + distance * self.direction, self.receiver);
+        x.with_groups(self.groups).at_time(self.time)
     }
 
     /// The segment as far as anything arrives from it; `None` if from nowhere.
@@ -103,7 +113,9 @@ impl<'a> LightSamplerView<'a> {
     /// Returns the lights as seen from a stretch of a ray: see [`LightSampler::along`].
     pub fn along(&self, segment: &RaySegment) -> SegmentSampler<'a> {
         let medium = segment.medium();
-        let distances = medium.map(|medium| Distances::new(&self.scene, medium, segment.groups));
+        let lights = LightsView { time: segment.time, ..self.scene.lights };
+        let scene = LightScene { lights, ..self.scene };
+        let distances = medium.map(|medium| Distances::new(&scene, medium, segment.groups));
         SegmentSampler { lights: *self, segment: *segment, distances }
     }
 }

@@ -146,7 +146,7 @@ impl LeafOracle for Viewpoint<'_> {
     }
 
     fn irradiance_per_area(&self, leaf: u32) -> f32 {
-        self.scene.lights.light(leaf).irradiance_per_area(&self.x)
+        self.scene.lights.irradiance_per_area(leaf, &self.x)
     }
 
     #[inline(always)]

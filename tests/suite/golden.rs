@@ -13,6 +13,7 @@ use crate::groups::scene as grouped;
 use crate::instances;
 use crate::instances::town::Town;
 use crate::kinds::{mixed, pdf_again};
+use crate::motion::shutter::Moving;
 use fanlight::{
     Effort, LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId, Visibility,
 };
@@ -30,15 +31,8 @@ const LEARNED: usize = 6;
 const TOWNS: usize = 12;
 /// Scenes that are sampled with the least effort.
 const LEAST: usize = 12;
-
-/// End of the scenes that mix all kinds.
-const LAST_KIND: usize = SCENES + KINDS;
-/// End of the scenes with light groups.
-const LAST_GROUPS: usize = LAST_KIND + GROUPS;
-/// End of the scenes with learned visibility.
-const LAST_LEARNED: usize = LAST_GROUPS + LEARNED;
-/// End of the scenes of instances.
-const LAST_TOWN: usize = LAST_LEARNED + TOWNS;
+/// Scenes that move.
+const MOVING: usize = 6;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// The same scenes at points with lobes.
@@ -235,6 +229,38 @@ fn line_of_town(number: usize) -> String {
     format!("{number:2} instances {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene that moves.
+fn line_of_motion(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 85);
+    let moving = Moving::random(&mut pcg, number, number % 2 == 0, number % 5);
+    let lights = moving.build(ARITIES[number % 3]);
+    let splitting = Splitting::new(0.7, 2);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    for i in 0..POINTS {
+        let time = pcg.f32();
+        let x = instances::point(&moving.start, &mut pcg, i).at_time(time);
+        let at = lights.at(&x);
+        let u = pcg.cube();
+        for sample in at.sample(u).iter().chain(sample_split(&at, u, &splitting).iter().take(8)) {
+            drawn += 1;
+            let hit = sample.hit().expect("a triangle");
+            hash.add(&[f32::from_bits(hit.instance.map_or(u32::MAX, |instance| instance.index()))]);
+            hash.add_sample(sample);
+            hash.add(&[at.pdf(&hit), at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
+        }
+        let emission = lights.emission().at_time(time);
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            [ray.position, ray.normal, ray.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[ray.pdf, ray.pmf, emission.pdf_ray(x.position, pcg.direction())]);
+        }
+        let along = lights.along(&RaySegment::new(x.position, pcg.direction(), 2.0, 0.3).at_time(time));
+        if let Some(sample) = along.sample([pcg.f32(), pcg.f32(), pcg.f32(), pcg.f32()]) {
+            hash.add(&[sample.distance, sample.pdf_distance, sample.light.pdf, along.pdf_distance(0.5)]);
+        }
+    }
+    format!("{number:2} motion {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -245,18 +271,27 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
     compare(LOBES, true);
 }
 
+/// Lines by their number.
+type Lines = Box<dyn Fn(usize) -> String + Sync>;
+
+/// What is listed after the random scenes: how many lines, and each.
+fn more() -> [(usize, Lines); 6] {
+    [
+        (KINDS, Box::new(line_of_kinds)),
+        (GROUPS, Box::new(line_of_groups)),
+        (LEARNED, Box::new(line_of_learned)),
+        (TOWNS, Box::new(line_of_town)),
+        (LEAST, Box::new(line_of_least)),
+        (MOVING, Box::new(line_of_motion)),
+    ]
+}
+
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED + TOWNS + LEAST };
-    let line = |i| match i {
-        0..SCENES => line(i, has_lobes),
-        SCENES..LAST_KIND => line_of_kinds(i - SCENES),
-        LAST_KIND..LAST_GROUPS => line_of_groups(i - LAST_KIND),
-        LAST_GROUPS..LAST_LEARNED => line_of_learned(i - LAST_GROUPS),
-        LAST_LEARNED..LAST_TOWN => line_of_town(i - LAST_LEARNED),
-        _ => line_of_least(i - LAST_TOWN),
-    };
-    let found = parallel::map(SCENES + more, line).concat();
+    let of_scenes: (usize, Lines) = (SCENES, Box::new(move |i| line(i, has_lobes)));
+    let lists = if has_lobes { vec![of_scenes] } else { [of_scenes].into_iter().chain(more()).collect() };
+    let all: Vec<_> = lists.iter().flat_map(|(count, line)| (0..*count).map(move |i| (line, i))).collect();
+    let found = parallel::map(all.len(), |k| all[k].0(all[k].1)).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {
         std::fs::write(&path, found).expect("the list can be written");
         panic!("{} is written, and nothing was compared", path.display());

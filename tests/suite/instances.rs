@@ -91,7 +91,7 @@ fn conditional_densities_are_those_of_flattened_triangles() {
 }
 
 /// All densities of a sample agree, those of rays and of split trees too.
-fn check_agreement(lights: &LightSamplerView<'_>, x: &ShadingPoint, pcg: &mut Pcg32, count: usize) -> usize {
+pub(crate) fn check_agreement(lights: &LightSamplerView<'_>, x: &ShadingPoint, pcg: &mut Pcg32, count: usize) -> usize {
     let at = lights.at(x);
     let splitting = Splitting::new(0.7, 2);
     let mut drawn = 0;
@@ -221,7 +221,7 @@ fn densities_integrate_to_the_rate_of_samples() {
 }
 
 /// Probability of a triangle.
-fn pmf(at: &PointSampler<'_>, hit: &Hit) -> f32 {
+pub(crate) fn pmf(at: &PointSampler<'_>, hit: &Hit) -> f32 {
     match hit.instance {
         Some(instance) => at.pmf_within(instance, hit.triangle),
         None => at.pmf(hit.triangle),

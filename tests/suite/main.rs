@@ -28,6 +28,7 @@ mod irradiance;
 mod kinds;
 mod layering;
 mod memory;
+mod motion;
 mod near;
 mod normalisation;
 mod procedural;

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3, Vec3};
 use super::object::{root_of, symmetric};
 use super::{PlacedObject, corners};
 use crate::bounds::{LightBounds, Moments};
-use crate::geometry::{Aabb, Cone, Placement, norm};
+use crate::geometry::{Aabb, Cone, Placement, between, norm};
 use crate::math;
 use core::f32::consts::{FRAC_PI_2, PI};
 
@@ -34,34 +34,50 @@ impl PlacedObject<'_> {
         root_of(trace(&(areas * symmetric(self.object.header.normals) * areas.transpose())))
     }
 
+    /// Returns the mean of [`Self::area_scale`] over the shutter interval.
+    pub(super) fn mean_area_scale(&self) -> f64 {
+        self.mean(|placement| self.area_scale(placement))
+    }
+
+    /// Returns the same, where the map to the world is known already if the instance stands still.
+    pub(super) fn area_scale_for(&self, placement: &Placement) -> f64 {
+        if self.end.is_some() { self.mean_area_scale() } else { self.area_scale(placement) }
+    }
+
     /// Returns weight times area of emitters, and transmittance times area of portals.
     pub(in crate::light) fn energies(&self) -> [f64; 2] {
-        let scale = f64::from(self.record.scale) * self.area_scale(&self.record.placement());
+        let scale = f64::from(self.record.scale) * self.mean_area_scale();
         [self.object.header.flux, self.object.header.portal].map(|energy| f64::from(energy) * scale)
     }
 
     /// Returns bounds and moments with these energies, of what does not depend on the direction and of what does.
     pub(in crate::light) fn bounds_with(&self, [flux, portal]: [f32; 2]) -> (LightBounds, Moments) {
-        let (header, placement) = (self.object.header, self.record.placement());
+        let (header, ends) = (self.object.header, self.ends());
+        let [start, end] = &ends;
+        let (axis, theta) = (Vec3::from(header.axis), header.theta);
+        let aabb = self.aabb(start);
         let bounds = LightBounds {
-            aabb: self.aabb(&placement),
-            normals: mapped_cone(&placement, Vec3::from(header.axis), header.theta),
+            aabb: if self.end.is_some() { aabb.union(self.aabb(end)) } else { aabb },
+            normals: self.moving_cone(axis, theta).unwrap_or_else(|| mapped_cone(start, axis, theta)),
             emission: FRAC_PI_2,
             flux,
             portal,
             two_sided: header.two_sided != 0,
         };
-        let mean = placement.relative_to(Vec3::ZERO, Vec3::from(header.mean));
-        let linear = placement.linear;
-        let variance = trace(&(linear * symmetric(header.covariance) * linear.transpose())).max(0.0);
-        let area_scale = self.area_scale(&placement).max(f64::MIN_POSITIVE);
-        let normal = placement.areas() * Vec3::from(header.normal).as_dvec3() / area_scale;
+        let center = Vec3::from(header.mean);
+        let means = [start, end].map(|placement| placement.relative_to(Vec3::ZERO, center));
+        let within = self.mean(|&Placement { linear, .. }| {
+            trace(&(linear * symmetric(header.covariance) * linear.transpose())).max(0.0)
+        });
+        let area_scale = self.mean_area_scale().max(f64::MIN_POSITIVE);
+        let normal = self.mean_areas() * Vec3::from(header.normal).as_dvec3() / area_scale;
         // Each triangle counts with its own area here, so that rounding alone makes this longer than 1.
         let normal = normal.clamp_length_max(1.0);
         let moments = Moments {
             energy: flux + portal,
-            mean: mean.as_vec3().clamp(bounds.aabb.min, bounds.aabb.max),
-            variance: variance as f32,
+            mean: between(means[0], means[1], 0.5).as_vec3().clamp(bounds.aabb.min, bounds.aabb.max),
+            // The mean moves evenly along a stretch.
+            variance: (within + (means[1] - means[0]).length_squared() * (1.0 / 12.0)) as f32,
             normal: if normal.is_finite() { normal.as_vec3() } else { Vec3::Z },
         };
         (bounds, moments)
@@ -79,6 +95,9 @@ impl PlacedObject<'_> {
     }
 }
 
+/// The cone of all directions.
+const EVERY_NORMAL: Cone = Cone { axis: Vec3::Z, theta: PI };
+
 fn trace(matrix: &DMat3) -> f64 {
     matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
 }
@@ -89,19 +108,25 @@ fn trace(matrix: &DMat3) -> f64 {
 /// image of the axis, where C maps normals.
 fn mapped_cone(placement: &Placement, axis: Vec3, theta: f32) -> Cone {
     let areas = placement.areas();
-    let image = areas * axis.as_dvec3();
-    let Some(unit) = image.try_normalize() else { return Cone { axis: Vec3::Z, theta: PI } };
+    if theta > 0.0 && placement.is_similarity() {
+        let unit = (areas * axis.as_dvec3()).try_normalize();
+        return unit.map_or(EVERY_NORMAL, |unit| Cone { axis: unit.as_vec3(), theta: theta + SIMILARITY_MARGIN });
+    }
+    mapped_cone_of(&areas, axis, theta)
+}
+
+/// Returns a cone that holds what a matrix makes of a cone of normals.
+pub(super) fn mapped_cone_of(areas: &DMat3, axis: Vec3, theta: f32) -> Cone {
+    let image = *areas * axis.as_dvec3();
+    let Some(unit) = image.try_normalize() else { return EVERY_NORMAL };
     let axis = unit.as_vec3();
     if theta == 0.0 {
         return Cone { axis, theta };
-    }
-    if placement.is_similarity() {
-        return Cone { axis, theta: theta + SIMILARITY_MARGIN };
     }
     let (sin, cos) = math::sin_cos(theta);
     if !(theta < FRAC_PI_2 && cos > 0.0) {
         return Cone { axis, theta: PI };
     }
-    let spread = norm(&areas) * f64::from(sin / cos) / image.length();
+    let spread = norm(areas) * f64::from(sin / cos) / image.length();
     Cone { axis, theta: if spread < 1.0 { math::asin(spread as f32) + CONE_ROUNDING } else { PI } }
 }

@@ -86,6 +86,9 @@ impl<'a> LightCollection<'a> {
         if let Some(mesh) = meshes.iter().position(|mesh| mesh.groups != ALL_GROUPS) {
             return Err(Error(ErrorKind::GroupsInObject { object: number, mesh }));
         }
+        if let Some(mesh) = meshes.iter().position(|mesh| mesh.end.is_some()) {
+            return Err(Error(ErrorKind::MotionInObject { object: number, mesh }));
+        }
         let mut object = AddedObject::empty();
         let meshes_before = self.mesh_groups.len();
         self.exchange_meshes(&mut object);
@@ -114,6 +117,7 @@ impl<'a> LightCollection<'a> {
         }
         self.instances.push(InstanceRecord::new(instance, number, 0, added.corners)?);
         self.instance_groups.push(instance.groups);
+        self.motion.set_instance(number as u32, instance.end_columns());
         Ok(InstanceId(number as u32))
     }
 
@@ -150,7 +154,7 @@ impl<'a> LightCollection<'a> {
 
 impl LightTriangle {
     /// Returns the record that stands for an instance in the order of the tree's leaves. *Format*: it is marked as a lamp and a
-    /// portal, which no lamp is.
+    /// portal, which no lamp is, and a moving triangle with one more mark.
     pub(in crate::light) fn of_instance(number: u32) -> Self {
         let mark = Self::LAMP | Self::PORTAL;
         Self { index_and_flags: number | mark, ..bytemuck::Zeroable::zeroed() }
@@ -160,7 +164,7 @@ impl LightTriangle {
     #[inline(always)]
     pub(in crate::light) fn instance(&self) -> Option<u32> {
         let mark = Self::LAMP | Self::PORTAL;
-        (self.index_and_flags & mark == mark).then_some(self.index_and_flags & !mark)
+        (self.index_and_flags & (mark | Self::MOVING) == mark).then_some(self.index_and_flags & !mark)
     }
 }
 

@@ -11,7 +11,7 @@ use crate::warp::Variate;
 impl PlacedObject<'_> {
     /// Visits every triangle, by its leaf, whose box a ray crosses. `direction` need not be a unit vector.
     pub(crate) fn cross(&self, origin: Vec3, direction: Vec3, visit: impl FnMut(u32)) {
-        let placement = self.record.placement();
+        let placement = self.placement();
         let (origin, margin) = ray_origin(&placement, origin);
         let direction = (placement.inverse * direction.as_dvec3()).normalize_or_zero().as_vec3();
         self.object.tree().cross_within(origin, direction, margin, visit);
@@ -23,7 +23,7 @@ impl PlacedObject<'_> {
     /// The map makes an elliptic cone of it. A direction `a + τ`, with τ across the axis a and no longer than `tan r`, is mapped
     /// to within `asin(‖M⁻¹‖ tan r / |M⁻¹ a|)` of the image of the axis.
     pub(crate) fn meet(&self, origin: Vec3, axis: Vec3, [sin, cos]: [f32; 2], visit: impl FnMut(u32)) {
-        let placement = self.record.placement();
+        let placement = self.placement();
         let (origin, margin) = ray_origin(&placement, origin);
         let image = placement.inverse * axis.as_dvec3();
         let own_sin = norm(&placement.inverse) * f64::from(sin) / (f64::from(cos) * image.length());
@@ -53,7 +53,7 @@ impl PlacedObject<'_> {
         match outgoing {
             Outgoing::Diffuse => Outgoing::Diffuse,
             Outgoing::Beam(beam) => {
-                let direction = self.record.placement().inverse * beam.direction.as_dvec3();
+                let direction = self.placement().inverse * beam.direction.as_dvec3();
                 Outgoing::Beam(Beam { direction: direction.normalize_or_zero().as_vec3(), ..*beam })
             }
         }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{PlacedObject, PlacedTriangle, records};
-use crate::light::{Light, LightKind, LightLeaf, LightTriangle, LightsView, LocalPoint, NO_LEAF};
+use crate::light::{LightKind, LightLeaf, LightTriangle, LightsView, LocalPoint, NO_LEAF};
 use crate::receiver::ShadingPoint;
 use crate::record::{InstanceId, TriangleId};
 
@@ -11,7 +11,7 @@ impl PlacedObject<'_> {
     /// Returns all triangles in their places, rounded to single precision, with their fronts as the order of their vertices
     /// says. What else they hold counts for nothing.
     pub(in crate::light) fn flattened(&self) -> impl Iterator<Item = LightTriangle> {
-        let is_mirrored = self.record.placement().is_mirrored();
+        let is_mirrored = self.placement().is_mirrored();
         (0..self.object.len() as u32).map(move |below| {
             let triangle = self.triangle(below);
             let [a, b, c] = triangle.exactly_relative_to(Vec3::ZERO).map(|vertex| vertex.as_vec3().to_array());
@@ -43,10 +43,8 @@ impl<'a> LightsView<'a> {
     /// Returns the instance in a leaf; `None` for a light of its own.
     #[inline]
     pub(crate) fn instance(&self, leaf: u32) -> Option<PlacedObject<'a>> {
-        match self.light(leaf) {
-            Light::Instance(placed) => Some(placed),
-            Light::Triangle(_) | Light::Lamp(_) => None,
-        }
+        let number = self.records[leaf as usize].instance()?;
+        Some(PlacedObject::at(self.instances, number).moving(self.extras(), number, self.time))
     }
 
     /// Returns the leaf of a triangle of an instance; `None` for one that emits nothing or that was never added.
@@ -69,9 +67,30 @@ impl<'a> LightsView<'a> {
         (triangle, Some(InstanceId(number)))
     }
 
+    /// Returns the irradiance from the light in a leaf if it has unit radiance, per area of the light
+    /// ([`LightKind::irradiance_per_area`]).
+    #[inline]
+    pub(crate) fn irradiance_per_area(&self, leaf: u32, x: &ShadingPoint) -> f32 {
+        if let Some(triangle) = self.still(leaf) {
+            return triangle.irradiance_per_area(x);
+        }
+        match self.instance(leaf) {
+            Some(placed) => placed.irradiance_per_area(x),
+            None => self.light(leaf).irradiance_per_area(x),
+        }
+    }
+
     /// Whether the environment shines in through a light.
     #[inline]
     pub(crate) fn is_portal(&self, leaf: LightLeaf) -> bool {
+        match self.still(leaf.top) {
+            Some(triangle) => triangle.is_portal(),
+            None => self.is_other_portal(leaf),
+        }
+    }
+
+    #[inline(never)]
+    fn is_other_portal(&self, leaf: LightLeaf) -> bool {
         match self.placed(leaf) {
             None => self.light(leaf.top).is_portal(),
             Some(triangle) => triangle.is_portal(),
@@ -90,6 +109,14 @@ impl<'a> LightsView<'a> {
     /// Returns the point where a ray crosses a light, if it does. `direction` need not be a unit vector.
     #[inline]
     pub(crate) fn intersect(&self, leaf: LightLeaf, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
+        match self.still(leaf.top) {
+            Some(triangle) => triangle.intersect(origin, direction),
+            None => self.intersect_other(leaf, origin, direction),
+        }
+    }
+
+    #[inline(never)]
+    fn intersect_other(&self, leaf: LightLeaf, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         match self.placed(leaf) {
             None => self.light(leaf.top).intersect(origin, direction),
             Some(triangle) => triangle.intersect(origin, direction),

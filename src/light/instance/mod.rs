@@ -10,6 +10,7 @@ mod bounds;
 mod collect;
 mod cross;
 mod lookup;
+mod moving;
 mod object;
 mod triangle;
 mod update;
@@ -21,6 +22,7 @@ use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Vec3};
 
+use super::motion::EndColumns;
 use super::{LightKind, LocalPoint, POSITION_LIMIT, storable};
 use crate::blas;
 use crate::bounds::{LightBounds, Moments};
@@ -60,12 +62,14 @@ pub struct Instance {
     pub(super) transform: Affine3A,
     pub(super) scale: f32,
     pub(super) groups: u32,
+    /// Transform at the end of the shutter interval; `None` for an instance that stands still.
+    end: Option<Affine3A>,
 }
 
 impl Instance {
     /// Returns an object at the place that a transform maps it to.
     pub const fn new(object: ObjectId, transform: Affine3A) -> Self {
-        Self { object, transform, scale: 1.0, groups: ALL_GROUPS }
+        Self { object, transform, scale: 1.0, groups: ALL_GROUPS, end: None }
     }
 
     /// Multiplies the weights of the object's meshes, 1 until this sets it: finite, not negative. 0 switches the instance off.
@@ -107,11 +111,13 @@ impl InstanceRecord {
     ///
     /// # Errors
     ///
-    /// If the map is not finite or not invertible, moves a corner too far away, or the factor is out of its range.
+    /// If the map is not finite or not invertible, at the start of the interval or later, moves a corner too far away, or the
+    /// factor is out of its range.
     pub(super) fn new(instance: &Instance, number: usize, object: u32, [low, high]: [Vec3; 2]) -> Result<Self, Error> {
         let columns = instance.transform.to_cols_array_2d();
         let record = Self { columns, object, scale: instance.scale, leaf: super::NO_LEAF, number: instance.object.0 };
-        record.check([low, high]).map(|()| record).map_err(|Fault { what, value, expected }| {
+        let moves = || instance.end_columns().map_or(Ok(()), |end| record.check_motion(&end, [low, high]));
+        record.check([low, high]).and_then(|()| moves()).map(|()| record).map_err(|Fault { what, value, expected }| {
             Error(ErrorKind::Instance { instance: number, what, value, expected })
         })
     }
@@ -145,7 +151,7 @@ impl InstanceRecord {
         Ok(())
     }
 
-    /// Returns the map to the world.
+    /// Returns the map to the world at the start of the interval.
     #[inline]
     pub(super) fn placement(&self) -> Placement {
         Placement::new(&self.columns)
@@ -209,13 +215,16 @@ pub(super) fn join(instances: &[InstanceRecord], objects: &[u32]) -> Vec<u32> {
 pub(crate) struct PlacedObject<'a> {
     pub(super) record: &'a InstanceRecord,
     pub(super) object: Object<'a>,
+    /// Transform at the end of the shutter interval; `None` for an instance that stands still.
+    end: Option<&'a EndColumns>,
+    time: f32,
 }
 
 impl<'a> PlacedObject<'a> {
     /// Returns the instance with the object that it places, whose words are among these.
     #[inline]
     pub(super) fn new(record: &'a InstanceRecord, words: &'a [u32]) -> Self {
-        Self { record, object: Object::at(words, record.object) }
+        Self { record, object: Object::at(words, record.object), end: None, time: 0.0 }
     }
 
     /// Returns the instance of a number by the words of all.
@@ -248,7 +257,7 @@ impl<'a> PlacedObject<'a> {
     /// Returns one of the object's triangles in its place.
     #[inline]
     pub(crate) fn triangle(&self, below: u32) -> PlacedTriangle<'a> {
-        PlacedTriangle::new(&self.object.records()[below as usize], self.record.placement())
+        PlacedTriangle::new(&self.object.records()[below as usize], self.placement())
     }
 }
 
@@ -269,7 +278,7 @@ impl LightKind for PlacedObject<'_> {
 
     /// Returns the mean factor that areas are multiplied by.
     fn area(&self) -> f32 {
-        self.area_scale(&self.record.placement()) as f32
+        self.mean_area_scale() as f32
     }
 
     fn bounds(&self, directional: bool, energy: impl FnOnce(f32) -> f32) -> (LightBounds, Moments) {
@@ -286,7 +295,7 @@ impl LightKind for PlacedObject<'_> {
     #[inline(never)]
     fn irradiance_per_area(&self, x: &ShadingPoint) -> f32 {
         let Some(walk) = ObjectWalk::new(self, x, None) else { return 0.0 };
-        (f64::from(walk.irradiance()) / self.area_scale(&walk.placement)) as f32
+        (f64::from(walk.irradiance()) / self.area_scale_for(&walk.placement)) as f32
     }
 
     fn intersect(&self, _origin: Vec3, _direction: Vec3) -> Option<LocalPoint> {

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use super::{Instance, InstanceRecord, Object, records, records_mut};
 use crate::error::{Error, ErrorKind};
 use crate::light::Lights;
+use crate::light::motion::EndColumns;
 use crate::record::{InstanceId, ObjectId};
 
 impl Lights {
@@ -23,11 +24,18 @@ impl Lights {
             }
             let corners = Object::at(&self.instances, current.object).corners();
             let record = InstanceRecord::new(&instance, number, current.object, corners)?;
-            Ok((number, InstanceRecord { leaf: current.leaf, ..record }))
+            Ok((number, InstanceRecord { leaf: current.leaf, ..record }, instance.end_columns()))
         };
-        let replaced: Vec<(usize, InstanceRecord)> = updates.iter().map(replace).collect::<Result<_, _>>()?;
+        let replaced: Vec<(usize, InstanceRecord, Option<EndColumns>)> =
+            updates.iter().map(replace).collect::<Result<_, _>>()?;
+        let is_moving = !self.view().extras().motion().is_empty();
+        if is_moving || replaced.iter().any(|(_, _, end)| end.is_some()) {
+            self.update_motion(|motion| {
+                replaced.iter().for_each(|(number, _, end)| motion.set_instance(*number as u32, *end));
+            });
+        }
         let records = records_mut(&mut self.instances);
-        for (number, record) in replaced {
+        for (number, record, _) in replaced {
             records[number] = record;
         }
         Ok(())

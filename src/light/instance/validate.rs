@@ -34,6 +34,10 @@ impl LightsView<'_> {
             if instance.check(object.corners()).is_err() {
                 return Err(Error::bytes("transform or factor of an instance", i, 0, 0));
             }
+            let end = self.extras().motion().end_of_instance(i as u32);
+            if end.is_some_and(|end| instance.check_motion(end, object.corners()).is_err()) {
+                return Err(Error::bytes("transform of an instance at the end", i, 0, 0));
+            }
             let is_here =
                 |leaf: u32| self.records.get(leaf as usize).and_then(LightTriangle::instance) == Some(i as u32);
             // An instance that can emit has lights.

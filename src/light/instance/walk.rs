@@ -78,7 +78,7 @@ impl<'a> ObjectWalk<'a> {
         if !x.position.to_array().iter().all(|x| x.abs() <= FARTHEST_POINT) {
             return None;
         }
-        let (placement, parts) = (placed.record.placement(), placed.object.parts());
+        let (placement, parts) = (placed.placement(), placed.object.parts());
         let (receiver, normal_length) = own_receiver(x.receiver, &placement.linear);
         let (position, margin) = own_position(&placement, x.position);
         Some(Self {
@@ -86,7 +86,7 @@ impl<'a> ObjectWalk<'a> {
             records: parts.records,
             object: placed.object,
             x: *x,
-            own: ShadingPoint { position, receiver, groups: x.groups, effort: x.effort },
+            own: ShadingPoint { position, receiver, ..*x },
             normal_length,
             margin,
             is_simple: !x.receiver.has_lobe() && placement.is_similarity(),

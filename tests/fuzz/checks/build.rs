@@ -7,7 +7,7 @@ use fanlight::{
     LightSamplerBuilder, Mesh, PointLight, Profile, ProfileLight, ShadingPoint, Sides, SphereLight, SpotLight, Texture,
     TextureId, TubeLight, Visibility, Weight, Wrap,
 };
-use glam::{Affine3A, Mat3, Vec2, Vec3};
+use glam::{Affine3A, Mat3, Quat, Vec2, Vec3, Vec3Swizzles};
 
 use super::reader::Reader;
 
@@ -30,7 +30,7 @@ pub(crate) fn lights(reader: &mut Reader<'_>) -> Option<LightSampler> {
         images.iter().filter_map(|image| Some(builder.add_texture(image.texture()?))).collect();
     for soup in &meshes {
         // A mesh that is refused leaves the builder as it was.
-        let _ = builder.add_mesh(&soup.mesh(&textures));
+        let _ = builder.add_mesh(&soup.moving(&textures));
         if let Some(lamp) = soup.lamp(&mut builder) {
             let _ = builder.add_light_to(soup.groups(), lamp);
         }
@@ -49,7 +49,10 @@ fn add_instances(builder: &mut LightSamplerBuilder<'_>, meshes: &[Soup], texture
         for corner in frame.positions.chunks_exact(4).chain([&frame.positions[1..5]]) {
             let [x, y, z, place] = [0, 1, 2, 3].map(|k| corner[(k + i) % 4]);
             let transform = Affine3A::from_mat3_translation(Mat3::from_cols(x, y, z), place);
-            let _ = builder.add_instance(Instance::new(object, transform).scaled(frame.uvs[i].x));
+            let instance = Instance::new(object, transform).scaled(frame.uvs[i].x);
+            let _ = builder.add_instance(instance);
+            let end = Affine3A::from_mat3_translation(Mat3::from_cols(x + place, y, z), -place);
+            let _ = builder.add_instance(instance.moving_to(end));
         }
         let _ = builder.add_instance(Instance::new(object, Affine3A::from_translation(frame.positions[0])));
     }
@@ -86,12 +89,17 @@ fn some_lights(kind: u8) -> LightSampler {
         let profile = builder.add_profile(&profile).expect("a valid profile");
         builder.add_light_to(3, ProfileLight::new(Vec3::X, Vec3::Z, profile, 1.0)).expect("a valid light");
         builder.add_light_to(1, DistantLight::new(Vec3::Z, 1.0).angular_radius(0.1)).expect("a valid light");
+        let end: Vec<Vec3> = positions.iter().map(|p| *p + p.yzx()).collect();
+        builder.add_mesh(&mesh.moving_to(&end)).expect("a valid mesh");
     }
     // An instance of every other kind.
     if kind & 1 == kind >> 2 & 1 {
         let object = builder.add_object(&[mesh]).expect("a valid object");
         let transform = Affine3A::from_scale(Vec3::new(1.0, -0.5, 2.0));
-        builder.add_instance(Instance::new(object, transform)).expect("a valid instance");
+        let instance = Instance::new(object, transform);
+        let end =
+            Affine3A::from_scale_rotation_translation(Vec3::new(2.0, -0.5, 1.0), Quat::from_rotation_x(0.5), Vec3::X);
+        builder.add_instance(if kind == 15 { instance.moving_to(end) } else { instance }).expect("a valid instance");
     }
     builder.build().expect("few triangles")
 }
@@ -142,6 +150,8 @@ impl Image {
 /// Triangles in any places.
 struct Soup {
     positions: Vec<Vec3>,
+    /// The same in another order: where they move to, now and then.
+    end: Vec<Vec3>,
     indices: Vec<[u32; 3]>,
     uvs: Vec<Vec2>,
     /// A constant, or the number of an image.
@@ -153,7 +163,8 @@ struct Soup {
 impl Soup {
     fn read(reader: &mut Reader<'_>) -> Self {
         let vertices = reader.below(10);
-        let positions = (0..vertices).map(|_| reader.vector()).collect();
+        let positions: Vec<Vec3> = (0..vertices).map(|_| reader.vector()).collect();
+        let end = positions.iter().skip(1).chain(positions.first()).copied().collect();
         // Now and then one too many.
         let index = |reader: &mut Reader<'_>| {
             let one_more = usize::from(reader.byte() == 0);
@@ -163,7 +174,7 @@ impl Soup {
         let uvs = (0..vertices).map(|_| Vec2::new(reader.float(), reader.float())).collect();
         let weight = if reader.byte().is_multiple_of(2) { Ok(reader.float()) } else { Err(reader.below(3)) };
         let sides = if reader.byte().is_multiple_of(2) { Sides::One } else { Sides::Two };
-        Self { positions, indices, uvs, weight, sides, portal: reader.byte().is_multiple_of(2) }
+        Self { positions, end, indices, uvs, weight, sides, portal: reader.byte().is_multiple_of(2) }
     }
 
     /// A light that is no mesh, where there is no triangle: by no byte of its own.
@@ -188,6 +199,12 @@ impl Soup {
     /// Light groups, by no byte of their own.
     fn groups(&self) -> u32 {
         if self.positions.len() % 3 == 2 { 2 } else { u32::MAX }
+    }
+
+    /// The mesh, whose vertices may move: by no byte of its own.
+    fn moving(&self, textures: &[TextureId]) -> Mesh<'_> {
+        let mesh = self.mesh(textures);
+        if matches!(self.positions.len(), 7 | 9) { mesh.moving_to(&self.end) } else { mesh }
     }
 
     fn mesh(&self, textures: &[TextureId]) -> Mesh<'_> {

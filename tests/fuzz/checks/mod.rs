@@ -102,7 +102,7 @@ fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
     let u = [(); 3].map(|()| reader.float());
     let direction = reader.vector();
     // By no byte of its own, so that inputs that were found keep their meaning.
-    let x = x.with_groups([u32::MAX, u32::MAX, 1, 2][direction.x.to_bits() as usize % 4]);
+    let x = x.with_groups([u32::MAX, u32::MAX, 1, 2][direction.x.to_bits() as usize % 4]).at_time(direction.y);
     let at = lights.at(&x);
     along(lights, &x, u, direction);
     assert_density(lights.at(&x).pdf_direction(direction));
@@ -130,7 +130,7 @@ fn sample(lights: &LightSamplerView<'_>, reader: &mut Reader<'_>) {
 /// Draws a distance along a ray, and checks its density.
 fn along(lights: &LightSamplerView<'_>, x: &ShadingPoint, u: [f32; 3], direction: Vec3) {
     let segment = RaySegment::new(x.position, direction, u[0].abs() * 10.0, u[1].abs()).with_groups(x.groups);
-    let along = lights.along(&segment.receiver(x.receiver));
+    let along = lights.along(&segment.receiver(x.receiver).at_time(x.time()));
     if let Some((distance, pdf)) = along.sample_distance(u[2]) {
         assert!(distance >= 0.0 && distance <= segment.length && pdf > 0.0 && pdf.is_finite(), "{segment:?}");
         assert_close(along.pdf_distance(distance), pdf, &segment);
@@ -186,7 +186,7 @@ fn assert_close(found: f32, expected: f32, context: &impl core::fmt::Debug) {
 /// Draws a ray of light, and checks its density.
 fn emit(lights: &LightSampler, reader: &mut Reader<'_>) {
     let u = [(); 5].map(|()| reader.float());
-    let emission = lights.emission().within(Vec3::splat(u[4]), u[3]);
+    let emission = lights.emission().within(Vec3::splat(u[4]), u[3]).at_time(u[2]);
     if let Some(ray) = emission.sample(u) {
         assert!(ray.position.is_finite() && (ray.direction.length() - 1.0).abs() < 1e-4, "{ray:?}");
         assert!(ray.pdf > 0.0 && ray.pdf.is_finite() && ray.pmf > 0.0, "{ray:?}");

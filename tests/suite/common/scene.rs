@@ -226,10 +226,24 @@ impl Scene {
 
     /// Builds the scene with what is added to it at last.
     pub(crate) fn build_with(&self, arity: Arity, add: impl FnOnce(&mut LightSamplerBuilder<'_>)) -> LightSampler {
+        self.build_between(arity, None, add)
+    }
+
+    /// Builds the scene as it moves to another while the shutter is open.
+    pub(crate) fn build_moving(&self, arity: Arity, end: &Self) -> LightSampler {
+        self.build_between(arity, Some(end), |_| {})
+    }
+
+    fn build_between(
+        &self,
+        arity: Arity,
+        end: Option<&Self>,
+        add: impl FnOnce(&mut LightSamplerBuilder<'_>),
+    ) -> LightSampler {
         let builder = LightSampler::builder().environment(self.environment()).illumination(self.illumination);
         let mut builder = builder.arity(arity);
         let textures: Vec<_> = self.images.iter().map(|image| builder.add_texture(image.texture())).collect();
-        for light in &self.meshes {
+        for (i, light) in self.meshes.iter().enumerate() {
             let mesh = if light.portal { Mesh::portal } else { Mesh::emitter };
             let weight = match light.paint {
                 Paint::Constant(value) => Weight::Constant(value),
@@ -237,6 +251,7 @@ impl Scene {
             };
             let sides = if light.two_sided { Sides::Two } else { Sides::One };
             let mesh = mesh(&light.positions, &light.indices).uvs(&light.uvs).weight(weight).sides(sides);
+            let mesh = end.map_or(mesh, |end| mesh.moving_to(&end.meshes[i].positions));
             builder.add_mesh(&mesh).expect("the mesh is valid");
         }
         add(&mut builder);

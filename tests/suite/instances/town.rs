@@ -28,7 +28,7 @@ pub(crate) struct Town {
     pub(crate) objects: Vec<Vec<LightMesh>>,
     pub(crate) instances: Vec<(usize, Affine3A, f32)>,
     /// The meshes that stand alone, with images and the sky.
-    base: Scene,
+    pub(crate) base: Scene,
     /// All of it as meshes.
     pub(crate) flat: Scene,
     origins: Vec<Origin>,
@@ -221,7 +221,7 @@ impl Town {
 }
 
 /// A mesh as the crate gets it.
-fn mesh(light: &LightMesh) -> Mesh<'_> {
+pub(crate) fn mesh(light: &LightMesh) -> Mesh<'_> {
     let make = if light.portal { Mesh::portal } else { Mesh::emitter };
     let weight = match light.paint {
         Paint::Constant(value) => Weight::Constant(value),

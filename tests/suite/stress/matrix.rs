@@ -62,10 +62,10 @@ fn run(number: usize, plan: &Plan) -> (&'static str, Vec<Cell>) {
             continue;
         }
         row.scene.meshes.iter_mut().for_each(|mesh| mesh.two_sided = variant % 2 == 1);
-        let lights = build(&row.scene, ARITIES[variant / 2]);
+        let lights = row.build(ARITIES[variant / 2]);
         for (column, receiver) in all().collect::<Vec<_>>() {
             let Some(effort) = turn(column, receiver) else { continue };
-            let x = columns::point(&row.scene, column, receiver);
+            let x = row.now(columns::point(&row.scene, column, receiver));
             let at = lights.at(&x);
             let seed = (number * cells.len() + column) as u64;
             let mut found = measure((&row, &lights), &at, &x, effort, seed);

@@ -2,7 +2,7 @@
 
 use core::f32::consts::PI;
 
-use fanlight::{Filter, Wrap};
+use fanlight::{Arity, Filter, LightSampler, ShadingPoint, Wrap};
 use glam::{Mat3, Quat, Vec2, Vec3};
 
 use crate::common::pcg::Pcg32;
@@ -18,6 +18,30 @@ pub(crate) struct Row {
     pub(crate) detail: f64,
     /// Whether a look at every triangle takes so long that there are fewer of them.
     pub(crate) large: bool,
+    /// How far a vertex moves while the shutter is open; it is where the scene says at [`MIDDLE`].
+    way: fn(Vec3) -> Vec3,
+}
+
+/// The time at which all rows are looked at.
+const MIDDLE: f32 = 0.5;
+
+impl Row {
+    /// The sampler of the scene, as it moves.
+    pub(crate) fn build(&self, arity: Arity) -> LightSampler {
+        let aside = |share: f32| {
+            let mut scene = self.scene.clone();
+            let all = scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions);
+            all.for_each(|p| *p += share * (self.way)(*p));
+            scene
+        };
+        let (start, end) = (aside(-MIDDLE), aside(1.0 - MIDDLE));
+        start.build_moving(arity, &end)
+    }
+
+    /// A point at the time of the scene.
+    pub(crate) fn now(&self, x: ShadingPoint) -> ShadingPoint {
+        x.at_time(MIDDLE)
+    }
 }
 
 /// How large the largest scenes are.
@@ -28,7 +52,7 @@ pub(crate) struct Sizes {
 }
 
 /// The number of rows.
-pub(crate) const COUNT: usize = 24;
+pub(crate) const COUNT: usize = 27;
 
 /// A row by its number.
 pub(crate) fn row(number: usize, sizes: Sizes) -> Row {
@@ -58,15 +82,24 @@ pub(crate) fn row(number: usize, sizes: Sizes) -> Row {
         21 => ("sun on the other pole", sun([0, 255], 0.0)),
         22 => ("sun on a corner of cells", sun([64, 127], 0.002)),
         23 => ("environment of 4096^2", wide(&mut pcg, sizes.sky)),
+        24 => ("from a line to twice the size", book(|p| p)),
+        25 => ("moving, 1e6 from the origin", book(|p| p + Vec3::new(1e6, -1e6, 1e6))),
+        26 => ("sun through a moving portal", sun([33, 180], 0.0)),
         _ => unreachable!("there is no such row"),
     };
     let detail = match number {
         18 => 0.1,
-        19..=22 => 0.012,
+        19..=22 | 26 => 0.012,
         23 => 6.3 / sizes.sky as f64,
         _ => 1.0,
     };
-    Row { name, scene, detail, ones: number == 12, large: matches!(number, 7 | 23) }
+    let way: fn(Vec3) -> Vec3 = match number {
+        24 => |p| 2.0 * p * Vec3::Y,
+        25 => |p| Vec3::new(1.0, 0.5, 0.25 * f32::from(u8::from(p.x > 1e6))),
+        26 => |p| Vec3::new(0.25, 0.5, -0.25 * p.y),
+        _ => |_| Vec3::ZERO,
+    };
+    Row { name, scene, detail, ones: number == 12, large: matches!(number, 7 | 23), way }
 }
 
 /// Two triangles with an edge in common, one of which stands on the other's front.
