@@ -19,6 +19,7 @@ mod linear_density;
 mod mesh;
 mod meshes;
 mod profile;
+mod projection;
 mod spherical_grid;
 mod triangle;
 mod triangle_view;
@@ -53,6 +54,7 @@ pub(crate) use leaf::LightLeaf;
 pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
 pub use profile::Profile;
+pub use projection::Projection;
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
 pub(crate) use triangle_view::TriangleView;
 
