@@ -4,7 +4,7 @@ use crate::common::density::{OnTriangle, bin, id, probes};
 use crate::common::lights::{ARITIES, build, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
-use crate::common::scene::{Content, Scene, random_point, with_lobe};
+use crate::common::scene::{Content, Scene, random_point, with_lobe, with_microfacets};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
 use crate::common::tier::{few, some, tier};
 use fanlight::{Arity, Hit, ShadingPoint, Splitting};
@@ -18,6 +18,10 @@ const DEPTH: u32 = 2;
 const LEAST_ROUGHNESS: f32 = 0.1;
 /// Number of the first kind of receiver with a lobe; those below have none.
 const LOBES: usize = 3;
+/// The same of microfacets, which are narrower along an axis and in a refraction.
+const LEAST_MICROFACETS: f32 = 0.3;
+/// Number of the first kind of receiver with microfacets.
+const MICROFACETS: usize = 6;
 /// Samples of each cell that guide the integration.
 const PROBES: f64 = 50.0;
 
@@ -29,7 +33,9 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     let arities = ARITIES[number % ARITIES.len()];
     let lights = build(&scene, arities);
     let mut x = random_point(&mut pcg, receiver);
-    if receiver >= LOBES {
+    if receiver >= MICROFACETS {
+        x = with_microfacets(x, &mut pcg, LEAST_MICROFACETS);
+    } else if receiver >= LOBES {
         x = with_lobe(x, &mut pcg, LEAST_ROUGHNESS);
     }
     let bins = 1 << (2 * DEPTH);
@@ -110,6 +116,11 @@ fn samples_fill_the_cells_of_triangles_as_the_density_says() {
 #[test]
 fn samples_for_lobes_fill_the_cells_of_triangles_as_the_density_says() {
     check_cells(LOBES, few);
+}
+
+#[test]
+fn samples_for_microfacets_fill_the_cells_of_triangles_as_the_density_says() {
+    check_cells(MICROFACETS, few);
 }
 
 /// With three kinds of receivers from `first` on.

@@ -4,7 +4,7 @@
 //! or, without `std`, from `libm`, so that there is a list for each, and they hold for the system that they were made on.
 use std::path::Path;
 
-use crate::common::hostile::{random_scene, shading_point, shading_point_with_lobe};
+use crate::common::hostile::{random_scene, shading_point, shading_point_with_lobe, shading_point_with_microfacets};
 use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
@@ -13,6 +13,7 @@ use crate::groups::scene as grouped;
 use crate::instances;
 use crate::instances::town::Town;
 use crate::kinds::{mixed, pdf_again};
+use crate::projections::projectors;
 use fanlight::{LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId, Visibility};
 use glam::Vec3;
 
@@ -33,8 +34,15 @@ const LAST_KIND: usize = SCENES + KINDS;
 const LAST_GROUPS: usize = LAST_KIND + GROUPS;
 /// End of the scenes with learned visibility.
 const LAST_LEARNED: usize = LAST_GROUPS + LEARNED;
+/// End of the scenes of instances.
+const LAST_TOWN: usize = LAST_LEARNED + TOWNS;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
+/// Scenes at points with microfacets, after those at points with lobes.
+const MICROFACETS: usize = 20;
+/// Scenes with projections, at last.
+const PROJECTIONS: usize = 6;
+
 /// The same scenes at points with lobes.
 const LOBES: &str = if cfg!(feature = "std") { "lobes-std.txt" } else { "lobes-libm.txt" };
 
@@ -93,14 +101,13 @@ fn ask_environment(scene: &Scene, pcg: &mut Pcg32, hash: &mut Hash) {
 }
 
 /// One line about one scene.
-fn line(number: usize, has_lobes: bool) -> String {
+fn line(number: usize, make: fn(usize, &Scene, &mut Pcg32) -> ShadingPoint) -> String {
     let mut pcg = Pcg32::new(number as u64, 81);
     let scene = random_scene(number, &mut pcg);
     let arity = ARITIES[number % ARITIES.len()];
     let lights = build(&scene, arity);
     let mut hash = Hash::new();
     let mut drawn = 0;
-    let make = if has_lobes { shading_point_with_lobe } else { shading_point };
     let points: Vec<_> = (0..POINTS).map(|i| make(number + i, &scene, &mut pcg)).collect();
     for x in &points {
         drawn += ask(&lights, x, &mut pcg, &mut hash);
@@ -217,6 +224,28 @@ fn line_of_town(number: usize) -> String {
     format!("{number:2} instances {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene of projectors.
+fn line_of_projections(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let lights = projectors(number, &mut pcg);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    let emission = lights.emission();
+    for i in 0..POINTS {
+        let x = random_point(&mut pcg, i);
+        let at = lights.at(&x);
+        if let Some(sample) = at.sample(pcg.cube()) {
+            drawn += 1;
+            let id = sample.light.id().map_or(u32::MAX, |id| id.index());
+            hash.add(&[f32::from_bits(id), sample.distance, sample.pdf, sample.pmf, pdf_again(&at, &sample)]);
+        }
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            hash.add(&ray.direction.to_array());
+            hash.add(&[ray.pdf, ray.pmf]);
+        }
+    }
+    format!("{number:2} projections {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -229,13 +258,16 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED + TOWNS };
+    let more = if has_lobes { MICROFACETS } else { KINDS + GROUPS + LEARNED + TOWNS + PROJECTIONS };
     let line = |i| match i {
-        0..SCENES => line(i, has_lobes),
+        0..SCENES if has_lobes => line(i, shading_point_with_lobe),
+        0..SCENES => line(i, shading_point),
+        _ if has_lobes => line(i, shading_point_with_microfacets),
         SCENES..LAST_KIND => line_of_kinds(i - SCENES),
         LAST_KIND..LAST_GROUPS => line_of_groups(i - LAST_KIND),
         LAST_GROUPS..LAST_LEARNED => line_of_learned(i - LAST_GROUPS),
-        _ => line_of_town(i - LAST_LEARNED),
+        LAST_LEARNED..LAST_TOWN => line_of_town(i - LAST_LEARNED),
+        _ => line_of_projections(i - LAST_TOWN),
     };
     let found = parallel::map(SCENES + more, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {

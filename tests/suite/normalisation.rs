@@ -5,7 +5,7 @@ use crate::common::density::{OnTriangle, id, probes};
 use crate::common::lights::{ARITIES, build};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
-use crate::common::scene::{Content, Scene, random_point, with_lobe};
+use crate::common::scene::{Content, Scene, random_point, with_lobe, with_microfacets};
 use crate::common::statistics::{binomial_p, sidak};
 use crate::common::tier::{few, some};
 use fanlight::{Hit, LightSample, LightSampler, ShadingPoint};
@@ -25,6 +25,10 @@ const MANY: usize = 100;
 const LEAST_ROUGHNESS: f32 = 0.1;
 /// Number of the first kind of receiver with a lobe; those below have none.
 const LOBES: usize = 3;
+/// The same of microfacets, which are narrower along an axis and in a refraction.
+const LEAST_MICROFACETS: f32 = 0.3;
+/// Number of the first kind of receiver with microfacets.
+const MICROFACETS: usize = 6;
 /// Triangles that together have less probability than this are left out.
 const NEGLIGIBLE: f64 = 2e-5;
 
@@ -106,7 +110,9 @@ fn examine_moved(
     let lights = build(&scene, arities);
     let mut x = random_point(&mut pcg, receiver);
     x.position = change(x.position);
-    if receiver >= LOBES {
+    if receiver >= MICROFACETS {
+        x = with_microfacets(x, &mut pcg, LEAST_MICROFACETS);
+    } else if receiver >= LOBES {
         x = with_lobe(x, &mut pcg, LEAST_ROUGHNESS);
     }
     let at = lights.at(&x);
@@ -241,6 +247,11 @@ fn elsewhere_the_shortfall_is_the_rate_of_none() {
 #[test]
 fn with_lobes_the_shortfall_is_the_rate_of_none() {
     check_elsewhere(false, LOBES, few, [11, 3, 6]);
+}
+
+#[test]
+fn with_microfacets_the_shortfall_is_the_rate_of_none() {
+    check_elsewhere(false, MICROFACETS, few, [11, 3, 6]);
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Scenes as plain descriptions, from which a sampler is built and an oracle computes.
 
 use fanlight::{
-    Arity, Environment, Filter, Glossy, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver, Scattering,
-    ShadingPoint, Sides, Texture, Weight, Wrap,
+    Arity, Environment, Filter, Glossy, Illumination, LightSampler, LightSamplerBuilder, Mesh, Microfacet, Receiver,
+    Scattering, ShadingPoint, Sides, Texture, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -274,4 +274,32 @@ pub(crate) fn with_lobe(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> Shading
     };
     let diffuse = if kind % 2 == 0 { 0.0 } else { pcg.f32() };
     ShadingPoint::glossy(x.position, Glossy::new(normal, outgoing, roughness).with_weights(diffuse, 1.0))
+}
+
+/// The same point with microfacets of roughnesses between `least` and 1 along a tangent and across: opaque in place of a
+/// surface, and with a transmission in place of all others.
+pub(crate) fn with_microfacets(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> ShadingPoint {
+    let (any, tangent, kind) = (pcg.direction(), pcg.direction(), pcg.below(8));
+    let (normal, transmits) = match x.receiver {
+        Receiver::Surface(normal) => (normal, false),
+        Receiver::Transmissive(normal) => (normal, true),
+        _ => (pcg.direction(), true),
+    };
+    let above = if any.dot(normal) < 0.0 { -any } else { any };
+    let outgoing = match kind {
+        // Grazing, below the horizon, and straight above.
+        0 => above - (1.0 - 1e-4) * normal * above.dot(normal),
+        1 => -above,
+        2 => normal,
+        _ => above,
+    };
+    let roughness = [(); 2].map(|()| least.powf(pcg.f32()));
+    let [diffuse, reflected] = [(); 2].map(|()| if pcg.below(2) == 0 { 0.0 } else { pcg.f32() });
+    let transmitted = if transmits { 0.1 + pcg.f32() } else { 0.0 };
+    let reflected = if transmits { reflected } else { 0.1 + reflected };
+    let surface = Microfacet::new(normal, outgoing, 0.5)
+        .anisotropic(tangent, roughness)
+        .with_weights(diffuse, reflected, transmitted)
+        .with_ior([1.0, 1.5, 1.0 / 1.5, 2.4][pcg.below(4)]);
+    ShadingPoint::microfacet(x.position, surface)
 }
