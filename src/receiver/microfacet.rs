@@ -19,7 +19,7 @@
 
 use core::f32::consts::{FRAC_2_PI, PI};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::glossy::{LEAST_OUTGOING, LEAST_ROUGHNESS, LEAST_SUM2, LEAST_WEIGHT, PARTS};
 use super::lambert::{lambert, solid_angle};
@@ -28,7 +28,7 @@ use super::lobe::{EVEN_SHARE, Lobe, SPREAD_OF_RADIUS2, unit_or_zero};
 use super::surface::Surface;
 use super::transmissive::Transmissive;
 use super::{Glossy, HeightWeights, Receiver, ReceiverKind, unit};
-use crate::math::{at_least, at_most, only_if, sqrt, sqrt64};
+use crate::math::{at_least, at_most, atan2_64, only_if, sin_cos, sqrt, sqrt64};
 
 /// Difference of the index of refraction from 1 up to which light passes straight on. Chosen.
 ///
@@ -48,6 +48,9 @@ const LEAST_TAIL: f32 = 0.25;
 
 /// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
 const LEAST_DISTANCE2: f32 = 1e-30;
+
+/// Sum of all weights of a surface. *Format.*
+const ALL_SHARES: u16 = u16::MAX;
 
 /// Variation of a region that the surface's own plane halves, where the two sides differ. Chosen: what is farther from the plane
 /// than its own deviation counts as constant.
@@ -81,15 +84,18 @@ pub struct Microfacet {
     normal: Vec3,
     /// Unit vector; zero if there is none.
     outgoing: Vec3,
-    /// Unit vector across the normal.
-    tangent: Vec3,
+    /// Angle of the tangent around the normal.
+    angle: f32,
     /// Along the tangent and across.
     roughness: [f32; 2],
     /// Relative index of refraction; 1 for a thin surface.
     ior: f32,
-    /// Weights of the diffuse base, of the reflection and of the transmission, relative to their sum.
-    shares: [f32; 3],
+    /// Weights of the reflection and of the transmission, relative to the sum of all; [`ALL_SHARES`] is 1.
+    shares: [u16; 2],
 }
+
+// A receiver of any kind is as large as this, and is copied for every one of them.
+const _: () = assert!(size_of::<Microfacet>() <= 44);
 
 impl Microfacet {
     /// Returns a surface that has nothing but a reflection, of one roughness in all directions.
@@ -100,8 +106,7 @@ impl Microfacet {
     #[must_use]
     pub fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
         let (normal, outgoing) = (unit(normal), unit_or_zero(outgoing));
-        let tangent = any_tangent(normal);
-        let surface = Self { normal, outgoing, tangent, roughness: [1.0; 2], ior: 1.0, shares: [0.0, 1.0, 0.0] };
+        let surface = Self { normal, outgoing, angle: 0.0, roughness: [1.0; 2], ior: 1.0, shares: [ALL_SHARES, 0] };
         surface.with_roughness([roughness; 2])
     }
 
@@ -115,17 +120,14 @@ impl Microfacet {
     #[must_use]
     pub fn anisotropic(self, tangent: Vec3, roughness: [f32; 2]) -> Self {
         let surface = self.with_roughness(roughness);
-        let (normal, along) = (self.normal.as_dvec3(), unit_or_zero(tangent).as_dvec3());
-        let across = along - normal * normal.dot(along);
-        match across.try_normalize() {
-            Some(tangent) if across.length_squared() > f64::from(LEAST_ACROSS2) => {
-                Self { tangent: tangent.as_vec3(), ..surface }
-            }
-            _ => {
-                let [x, y] = surface.roughness.map(f64::from);
-                Self { roughness: [sqrt64(x * y) as f32; 2], ..surface }
-            }
+        let (along, axes) = (unit_or_zero(tangent).as_dvec3(), axes_across(self.normal));
+        let [x, y] = axes.map(|axis| axis.dot(along));
+        // NaN fails.
+        if x * x + y * y > f64::from(LEAST_ACROSS2) {
+            return Self { angle: atan2_64(y, x) as f32, ..surface };
         }
+        let [x, y] = surface.roughness.map(f64::from);
+        Self { roughness: [sqrt64(x * y) as f32; 2], ..surface }
     }
 
     fn with_roughness(self, roughness: [f32; 2]) -> Self {
@@ -146,7 +148,22 @@ impl Microfacet {
         let weights =
             [diffuse, reflected, transmitted].map(|weight| f64::from(at_most(at_least(weight, 0.0), f32::MAX)));
         let sum: f64 = weights.iter().sum();
-        let shares = if sum > 0.0 { weights.map(|weight| (weight / sum) as f32) } else { [1.0, 0.0, 0.0] };
+        // What is positive stays so, and all of it adds up.
+        let code = |weight: f64| {
+            let share = weight / sum * f64::from(ALL_SHARES);
+            if weight > 0.0 { (share as u16).saturating_add(1) } else { 0 }
+        };
+        let [diffuse, reflected, transmitted] = weights;
+        let base = code(diffuse).min(ALL_SHARES - 2);
+        let shares = match [reflected > 0.0, transmitted > 0.0] {
+            [false, false] => [0; 2],
+            [true, false] => [ALL_SHARES - base, 0],
+            [false, true] => [0, ALL_SHARES - base],
+            [true, true] => {
+                let transmitted = code(transmitted).min(ALL_SHARES - 1 - base);
+                [ALL_SHARES - base - transmitted, transmitted]
+            }
+        };
         Self { shares, ..self }
     }
 
@@ -165,13 +182,13 @@ impl Microfacet {
     /// Whether there is a lobe.
     #[inline]
     pub(super) fn has_lobe(&self) -> bool {
-        self.shares[1] + self.shares[2] > 0.0 && self.normal.dot(self.outgoing) > 0.0
+        self.shares != [0; 2] && self.normal.dot(self.outgoing) > 0.0
     }
 
     /// Whether light comes from both sides.
     #[inline(always)]
     pub(super) fn transmits(&self) -> bool {
-        self.shares[2] > 0.0
+        self.shares[1] > 0
     }
 
     /// Returns the receiver that has the same cosine, and no lobe.
@@ -195,7 +212,9 @@ impl Microfacet {
     /// Returns the tangent, a unit vector across the normal.
     #[must_use]
     pub fn tangent(&self) -> Vec3 {
-        self.tangent
+        let [s, t] = axes_across(self.normal);
+        let (sin, cos) = sin_cos(self.angle);
+        (s * f64::from(cos) + t * f64::from(sin)).as_vec3()
     }
 
     /// Returns the roughnesses along the tangent and across it that guide, in `[1e-3, 1]`.
@@ -210,17 +229,34 @@ impl Microfacet {
         self.ior
     }
 
-    /// Returns the weights of the diffuse base, of the reflection and of the transmission, which add up to 1.
+    /// Returns the weights of the diffuse base, of the reflection and of the transmission, which add up to 1, in steps of
+    /// 1 / 65535.
     #[must_use]
     pub fn weights(&self) -> [f32; 3] {
-        self.shares
+        let [reflected, transmitted] = self.shares;
+        let rest = ALL_SHARES - reflected - transmitted;
+        [rest, reflected, transmitted].map(|share| f32::from(share) * (1.0 / f32::from(ALL_SHARES)))
     }
 
     /// Returns the surface with all vectors mapped.
     #[inline]
     pub(super) fn map(self, map: impl Fn(Vec3) -> Vec3) -> Self {
-        let [normal, outgoing, tangent] = [self.normal, self.outgoing, self.tangent].map(map);
-        Self { normal, outgoing, tangent, ..self }
+        let [normal, outgoing, tangent] = [self.normal, self.outgoing, self.tangent()].map(map);
+        let [x, y] = axes_across(normal).map(|axis| axis.dot(tangent.as_dvec3()));
+        Self { normal, outgoing, angle: atan2_64(y, x) as f32, ..self }
+    }
+
+    /// Returns the mean weight of the directions of a cone, by the lobe of the surface.
+    #[inline(always)]
+    fn mean_by(self, lobe: &MicrofacetLobe, axis: Vec3, sin_radius: f32) -> f32 {
+        let cosine = if self.transmits() {
+            self.transmissive().mean_over_cone(axis, sin_radius)
+        } else {
+            self.surface().mean_over_cone(axis, sin_radius)
+        };
+        // A disk of the radius R has a variance of R² / 2.
+        let mean = lobe.weigh(cosine, axis.to_array(), 1.0, 0.5 * sin_radius * sin_radius);
+        only_if(cosine > 0.0, mean)
     }
 
     #[inline(always)]
@@ -236,12 +272,13 @@ impl Microfacet {
     /// Returns the lobe prepared for loops.
     #[inline(always)]
     pub(crate) fn lobe(&self) -> MicrofacetLobe {
-        let frame = [self.tangent, self.normal.cross(self.tangent), self.normal];
+        let tangent = self.tangent();
+        let frame = [tangent, self.normal.cross(tangent), self.normal];
         let [t, b, n] = frame.map(|axis| axis.dot(self.outgoing));
         let n = at_least(n, LEAST_OUTGOING);
         let [x2, y2] = self.roughness.map(|alpha| alpha * alpha);
         let is_thin = self.ior == 1.0;
-        let [diffuse, reflected, transmitted] = self.shares;
+        let [diffuse, reflected, transmitted] = self.weights();
         MicrofacetLobe {
             frame: frame.map(|axis| axis.to_array()),
             outgoing: [t, b, n],
@@ -286,10 +323,11 @@ impl Glossy {
     }
 }
 
-/// Returns any unit vector across a normal.
-fn any_tangent(normal: Vec3) -> Vec3 {
-    let normal = normal.as_dvec3();
-    normal.normalize_or(glam::DVec3::Z).any_orthonormal_vector().as_vec3()
+/// Returns two unit vectors across a normal and each other.
+#[inline]
+fn axes_across(normal: Vec3) -> [DVec3; 2] {
+    let (s, t) = normal.as_dvec3().normalize_or(DVec3::Z).any_orthonormal_pair();
+    [s, t]
 }
 
 /// What light from one side of a surface meets.
@@ -461,7 +499,7 @@ impl ReceiverKind for Microfacet {
         let Halfway { sum: [_, _, upward], along: [out, _], .. } = lobe.halfway(&side, local);
         let is_below = side.turn < 0.0 && !(upward * out > 0.0);
         let value = if is_below { 0.0 } else { lobe.value(&side, height.abs(), local, 0.0) };
-        at_least(self.shares[0] * at_least(height, 0.0) + value, lobe.least * height.abs())
+        at_least(self.weights()[0] * at_least(height, 0.0) + value, lobe.least * height.abs())
     }
 
     #[inline(always)]
@@ -481,14 +519,20 @@ impl ReceiverKind for Microfacet {
 
     #[inline(always)]
     fn mean_over_cone(self, axis: Vec3, sin_radius: f32) -> f32 {
-        let cosine = if self.transmits() {
-            self.transmissive().mean_over_cone(axis, sin_radius)
-        } else {
-            self.surface().mean_over_cone(axis, sin_radius)
-        };
-        // A disk of the radius R has a variance of R² / 2.
-        let mean = self.lobe().weigh(cosine, axis.to_array(), 1.0, 0.5 * sin_radius * sin_radius);
-        only_if(cosine > 0.0, mean)
+        self.mean_by(&self.lobe(), axis, sin_radius)
+    }
+
+    #[inline(always)]
+    fn means_over_cones<const LANES: usize>(
+        self,
+        [x, y, z]: &[[f32; LANES]; 3],
+        sin_radii: &[f32; LANES],
+        means: &mut [f32; LANES],
+    ) {
+        let lobe = self.lobe();
+        for i in 0..LANES {
+            means[i] = self.mean_by(&lobe, Vec3::new(x[i], y[i], z[i]), sin_radii[i]);
+        }
     }
 
     #[inline(always)]

@@ -7,7 +7,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene, random_point, with_lobe, with_microfacets};
 use crate::common::statistics::{binomial_p, sidak};
-use crate::common::tier::{few, some};
+use crate::common::tier::{few, some, tier};
 use fanlight::{Hit, LightSample, LightSampler, ShadingPoint};
 use glam::Vec3;
 
@@ -251,7 +251,11 @@ fn with_lobes_the_shortfall_is_the_rate_of_none() {
 
 #[test]
 fn with_microfacets_the_shortfall_is_the_rate_of_none() {
-    check_elsewhere(false, MICROFACETS, few, [11, 3, 6]);
+    // Their densities take long to integrate: single triangles through glass, and in the full tier a third of the others.
+    let fewer = |count: usize| {
+        if tier().stride > 1 { vec![1, 4] } else { few(count).into_iter().step_by(3).collect() }
+    };
+    check_elsewhere(false, MICROFACETS, fewer, [11, 3, 6]);
 }
 
 #[test]

@@ -233,11 +233,23 @@ fn lobes_out_of_range_are_left_out() {
         let [x, y] = surface.anisotropic(tangent, [0.1, 0.4]).roughness();
         assert!(x == y && (x - 0.2).abs() < 1e-6, "{tangent}: {x} {y}");
     }
-    assert_eq!(surface.anisotropic(1e-20 * Vec3::Y, [0.1, 0.4]).tangent(), Vec3::Y);
+    assert!((surface.anisotropic(1e-20 * Vec3::Y, [0.1, 0.4]).tangent() - Vec3::Y).length() < 1e-6);
     let iors = [1.005, f32::NAN, -1.0, f32::INFINITY, 1.5].map(|ior| surface.with_ior(ior).ior());
     assert_eq!(iors, [1.0, 1.0, 0.1, 10.0, 1.5]);
-    let [_, reflected, transmitted] = surface.with_weights(0.0, f32::INFINITY, f32::MAX).weights();
-    assert_eq!([reflected, transmitted], [0.5; 2]);
+    // Weights add up, and what is positive stays so.
+    let weights = |diffuse, reflected, transmitted| surface.with_weights(diffuse, reflected, transmitted).weights();
+    for (found, expected) in [
+        (weights(0.0, f32::INFINITY, f32::MAX), [0.0, 0.5, 0.5]),
+        (weights(0.0, 1e-3, 0.0), [0.0, 1.0, 0.0]),
+        (weights(1e-9, 0.0, 7.0), [1.0 / 65535.0, 0.0, 1.0]),
+        (weights(1.0, 1e-9, 1e-9), [1.0, 1.0 / 65535.0, 1.0 / 65535.0]),
+        (weights(1e-9, 1e-9, 1.0), [1.0 / 65535.0, 1.0 / 65535.0, 1.0]),
+        (weights(1.0, 2.0, 1.0), [0.25, 0.5, 0.25]),
+    ] {
+        assert_eq!(found.map(|weight| weight > 0.0), expected.map(|weight| weight > 0.0), "{found:?}");
+        let is_near = found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 3e-4);
+        assert!(is_near && (found.iter().sum::<f32>() - 1.0).abs() < 1e-6, "{found:?}, not {expected:?}");
+    }
 }
 
 /// The irradiance is an estimate, within a factor of a few of brute force.
