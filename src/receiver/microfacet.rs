@@ -17,11 +17,13 @@
 //! incidence, and by `η / |o + η ω|` across. Both widen the distribution: to the matrix of the roughnesses, `diag(αx², αy²)`,
 //! that of this movement is added.
 
-use core::f32::consts::{FRAC_2_PI, PI};
+mod lobe;
+
+use core::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::glossy::{LEAST_OUTGOING, LEAST_ROUGHNESS, LEAST_SUM2, LEAST_WEIGHT, PARTS};
+use super::glossy::{LEAST_OUTGOING, LEAST_ROUGHNESS, LEAST_WEIGHT, PARTS};
 use super::lambert::{lambert, solid_angle};
 use super::lanes::ReceiverLanes;
 use super::lobe::{EVEN_SHARE, Lobe, SPREAD_OF_RADIUS2, unit_or_zero};
@@ -29,6 +31,8 @@ use super::surface::Surface;
 use super::transmissive::Transmissive;
 use super::{Glossy, HeightWeights, Receiver, ReceiverKind, unit};
 use crate::math::{at_least, at_most, atan2_64, only_if, sin_cos, sqrt, sqrt64};
+pub(crate) use lobe::MicrofacetLobe;
+use lobe::{Halfway, Side};
 
 /// Difference of the index of refraction from 1 up to which light passes straight on. Chosen.
 ///
@@ -42,21 +46,8 @@ const INDICES: [f32; 2] = [0.1, 10.0];
 /// near the directions are blurred as if these were on it.
 const LEAST_ACROSS2: f32 = 1e-12;
 
-/// Least part of the determinant in the denominator of the distribution. *Proved*: a half vector of unit length leaves more, but
-/// that of opposite directions is zero. Larger: peaks are cut off.
-const LEAST_TAIL: f32 = 0.25;
-
-/// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
-const LEAST_DISTANCE2: f32 = 1e-30;
-
 /// Sum of all weights of a surface. *Format.*
 const ALL_SHARES: u16 = u16::MAX;
-
-/// Variation of a region that the surface's own plane halves, where the two sides differ. Chosen: what is farther from the plane
-/// than its own deviation counts as constant.
-///
-/// Larger: divides cells that are hardly cut. Smaller: the lobe of one side stands for both.
-const PLANE_VARIATION: f32 = 0.16;
 
 /// A surface with a glossy reflection and a rough transmission over a diffuse base, seen from an outgoing direction.
 ///
@@ -328,158 +319,6 @@ impl Glossy {
 fn axes_across(normal: Vec3) -> [DVec3; 2] {
     let (s, t) = normal.as_dvec3().normalize_or(DVec3::Z).any_orthonormal_pair();
     [s, t]
-}
-
-/// What light from one side of a surface meets.
-#[derive(Clone, Copy, Debug)]
-struct Side {
-    /// Index of refraction of the lobe, 1 without a refraction.
-    ior: f32,
-    /// What heights over the plane are multiplied by: -1 where they are mirrored.
-    upright: f32,
-    /// Sign of the product of both directions' cosines to the half vector.
-    turn: f32,
-    /// Weight of the cosine: that of the diffuse base, with the share of the lobe that guides like it.
-    even: f32,
-    /// Weight of the cosine on the other side, for what a region has there.
-    other: f32,
-    /// Weight of the lobe.
-    share: f32,
-}
-
-/// Microfacet lobes over a diffuse base, prepared for loops.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct MicrofacetLobe {
-    /// Tangent, bitangent and normal.
-    frame: [[f32; 3]; 3],
-    /// Outgoing direction in this frame.
-    outgoing: [f32; 3],
-    /// Squared roughness along the tangent and across.
-    alpha2: [f32; 2],
-    /// `√(cos² θo + αx² ox² + αy² oy²)`, a part of Smith's term.
-    masking: f32,
-    /// The side of the normal, and the other.
-    sides: [Side; 2],
-    /// Weight of every direction.
-    least: f32,
-    /// 1 if light comes from both sides, and zero otherwise.
-    transmits: f32,
-}
-
-/// Half vectors of one direction.
-struct Halfway {
-    /// Sum of the outgoing direction and the direction times the index, in the frame of the lobe.
-    sum: [f32; 3],
-    /// One over the squared length of the sum.
-    inverse2: f32,
-    /// Products of the outgoing direction, and of the direction, with the sum.
-    along: [f32; 2],
-}
-
-impl MicrofacetLobe {
-    /// Returns a vector in the frame of the lobe.
-    #[inline(always)]
-    fn local(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        let [[tx, ty, tz], [bx, by, bz], [nx, ny, nz]] = self.frame;
-        // Not a map, whose closure would be compiled for the baseline.
-        [tx * x + ty * y + tz * z, bx * x + by * y + bz * z, nx * x + ny * y + nz * z]
-    }
-
-    /// Returns the side that a height over the plane is on.
-    #[inline(always)]
-    fn side(&self, height: f32) -> Side {
-        let [above, below] = self.sides;
-        let is_below = self.transmits * height < 0.0;
-        let choose = |a: f32, b: f32| if is_below { b } else { a };
-        Side {
-            ior: choose(above.ior, below.ior),
-            upright: choose(above.upright, below.upright),
-            turn: choose(above.turn, below.turn),
-            even: choose(above.even, below.even),
-            other: choose(above.other, below.other),
-            share: choose(above.share, below.share),
-        }
-    }
-
-    #[inline(always)]
-    fn halfway(&self, side: &Side, [t, b, n]: [f32; 3]) -> Halfway {
-        let ([ot, ob, on], ior) = (self.outgoing, side.ior);
-        let cosine = ot * t + ob * b + on * n;
-        let (ht, hb, hn) = (ot + ior * t, ob + ior * b, on + ior * n);
-        let sum2 = at_least(ht * ht + hb * hb + hn * hn, LEAST_SUM2);
-        Halfway { sum: [ht, hb, hn], inverse2: 1.0 / sum2, along: [1.0 + ior * cosine, cosine + ior] }
-    }
-
-    /// Returns the weight of the lobe in a unit direction of the lobe's frame, blurred by a variance of directions. `cosine` is
-    /// the absolute one.
-    #[inline(always)]
-    fn value(&self, side: &Side, cosine: f32, [t, b, n]: [f32; 3], spread2: f32) -> f32 {
-        let n = side.upright * n;
-        let Halfway { sum: [ht, hb, hn], inverse2, along: [out, toward] } = self.halfway(side, [t, b, n]);
-        let [x2, y2] = self.alpha2;
-        let ior2 = side.ior * side.ior;
-        // The movement of the half vector across the plane of incidence, and in it.
-        let blur = spread2 * ior2 * inverse2;
-        let (across, inside) = (at_most(blur, 1.0), at_most(blur * (toward * toward * inverse2), 1.0));
-        let (a, c) = (x2 + inside, y2 + inside);
-        // What the direction has across the half vector points along the plane of incidence.
-        let scale = toward * inverse2;
-        let (et, eb) = (t - scale * ht, b - scale * hb);
-        let (et2, eb2) = (et * et, eb * eb);
-        let rest = at_least(across - inside, 0.0) / at_least(et2 + eb2, LEAST_ACROSS2);
-        // The matrix is diag(a, c) + rest f fᵀ with f = (-eb, et). In this form nothing cancels.
-        let determinant = a * c + rest * (c * eb2 + a * et2);
-        let (ht2, hb2, eh) = (ht * ht, hb * hb, et * ht + eb * hb);
-        let slope = (c * ht2 + a * hb2 + rest * (eh * eh)) * inverse2;
-        // Wider than 1 it would be no distribution of heights.
-        let limit = at_least(at_least(a + rest * eb2, c + rest * et2), 1.0);
-        let tail = limit * slope + determinant * (hn * hn * inverse2);
-        let tail = at_least(tail, LEAST_TAIL * determinant);
-        // π D:
-        let distribution = limit * determinant * sqrt(determinant) / (tail * tail);
-        // G / (4 cos θ cos θo):
-        let shadowing = sqrt(cosine * cosine + x2 * (t * t) + y2 * (b * b));
-        let [_, _, on] = self.outgoing;
-        let visibility = 0.5 / at_least(cosine * self.masking + on * shadowing, f32::MIN_POSITIVE);
-        // 4 η² |o·h| |ω·h| / |o + η ω|², its product the mean of a clamped normal variable.
-        let (product, step) = (side.turn * out * toward, ior2 - 1.0);
-        let product = 0.5 * (product + sqrt(product * product + (0.5 * FRAC_2_PI) * (step * step) * spread2));
-        let jacobian = 4.0 * ior2 * at_least(product, 0.0) * (inverse2 * inverse2);
-        side.share * distribution * (visibility * cosine) * jacobian
-    }
-}
-
-impl Lobe for MicrofacetLobe {
-    #[inline(always)]
-    fn weigh(&self, toward: f32, center: [f32; 3], distance: f32, spread2: f32) -> f32 {
-        let [t, b, height] = self.local(center);
-        let inverse = 1.0 / sqrt(at_least(t * t + b * b + height * height, LEAST_DISTANCE2));
-        let side = self.side(height);
-        // What the region has on the other side of the plane: the mean of the absolute height is above that of the height.
-        let other = 0.5 * self.transmits * at_least(toward - height.abs(), 0.0);
-        let toward = toward - other;
-        let value = self.value(&side, toward / distance, [t * inverse, b * inverse, height * inverse], spread2);
-        side.even * toward + side.other * other + distance * (value + self.least)
-    }
-
-    /// As that of a glossy surface, with the mean of what both roughnesses give, and with the plane between both sides.
-    #[inline(always)]
-    fn variation(&self, direction: [f32; 3], spread2: f32) -> f32 {
-        let [t, b, n] = self.local(direction);
-        let side = self.side(n);
-        let Halfway { sum: [ht, hb, _], inverse2, .. } = self.halfway(&side, [t, b, side.upright * n]);
-        let [x2, y2] = self.alpha2;
-        let (x2, y2) = (1.0 / x2, 1.0 / y2);
-        let blur = spread2 * (side.ior * side.ior) * inverse2;
-        let plane = self.transmits * PLANE_VARIATION * spread2 / at_least(n * n, LEAST_ACROSS2);
-        4.0 * blur * (x2 + y2) / (1.0 + (ht * ht * x2 + hb * hb * y2) * inverse2) + plane
-    }
-
-    #[inline(always)]
-    fn map(self, map: impl Fn([f32; 3]) -> [f32; 3]) -> Self {
-        let [t, b, n] = self.frame;
-        Self { frame: [map(t), map(b), map(n)], ..self }
-    }
 }
 
 /// What concerns the cosine is that of an opaque surface, or of a transmissive one.
