@@ -169,10 +169,10 @@ pub use error::Error;
 /// The vectors of the interface.
 pub use glam;
 pub use light::{
-    DiskLight, DistantLight, Illumination, Instance, Lamp, Mesh, MeshUpdate, PointLight, Profile, ProfileLight, Sides,
-    SphereLight, SpotLight, TubeLight, Weight,
+    DiskLight, DistantLight, Illumination, Instance, Lamp, Mesh, MeshUpdate, PointLight, Profile, ProfileLight,
+    Projection, Sides, SphereLight, SpotLight, TubeLight, Weight,
 };
-pub use receiver::{Effort, Glossy, Receiver, Scattering, ShadingPoint};
+pub use receiver::{Effort, Glossy, Microfacet, Receiver, Scattering, ShadingPoint};
 pub use record::{
     Filter, Hit, InstanceId, LightId, LightSample, MeshId, ObjectId, ProfileId, SampledLight, TextureId, TriangleId,
     Wrap,

@@ -6,6 +6,7 @@
 
 mod arguments;
 mod gltf;
+mod ies;
 mod render;
 mod report;
 mod scenes;

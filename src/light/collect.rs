@@ -11,6 +11,7 @@ use super::mesh::{Mesh, MeshKind, Sides, Weight, check_end, check_triangles};
 use super::meshes::mesh_of;
 use super::motion::{MotionCollection, end_vertices};
 use super::profile::{Profile, ProfileCollection};
+use super::projection::Projection;
 use super::{
     Energies, Extras, Illumination, Lamp, LampLight, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA,
     NO_LEAF,
@@ -166,6 +167,11 @@ impl<'a> LightCollection<'a> {
     /// Adds a profile. After an error the collection is as it was before.
     pub(crate) fn add_profile(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
         self.profiles.add(profile)
+    }
+
+    /// Adds a projection. After an error the collection is as it was before.
+    pub(crate) fn add_projection(&mut self, projection: &Projection<'_>) -> Result<ProfileId, Error> {
+        self.profiles.add_projection(projection)
     }
 
     /// Returns the units of work of [`Self::build_images`].

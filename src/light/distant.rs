@@ -209,7 +209,7 @@ fn weigh_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
         Receiver::Surface(_) => cosine_over_cap(cap, normal),
         Receiver::Transmissive(_) => cosine_over_cap(cap, normal) + cosine_over_cap(cap, -normal),
         Receiver::Volume => cap.solid_angle(),
-        Receiver::Glossy(_) | Receiver::Scattering(_) => {
+        Receiver::Glossy(_) | Receiver::Scattering(_) | Receiver::Microfacet(_) => {
             let estimate = irradiance_of_cap(receiver, cap);
             let is_lit = !receiver.has_horizon() || cap.cos < 0.0 || normal.dot(cap.axis) > -cap.sin;
             if is_lit { estimate.max(LEAST_SHARE * cap.solid_angle()) } else { 0.0 }

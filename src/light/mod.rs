@@ -20,6 +20,7 @@ mod mesh;
 mod meshes;
 mod motion;
 mod profile;
+mod projection;
 mod spherical_grid;
 mod triangle;
 mod triangle_view;
@@ -55,6 +56,7 @@ pub use mesh::{Mesh, MeshUpdate, Sides, Weight};
 use meshes::{mesh_of, scale_of};
 pub(crate) use motion::MovingTriangle;
 pub use profile::Profile;
+pub use projection::Projection;
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
 pub(crate) use triangle_view::TriangleView;
 

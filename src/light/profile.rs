@@ -9,6 +9,7 @@ use core::f32::consts::{PI, TAU};
 use core::f64::consts::{PI as PI64, TAU as TAU64};
 
 use super::lamp::LampRecord;
+use super::projection::ProjectionTable;
 use crate::blas;
 use crate::error::{Error, ErrorKind};
 use crate::math;
@@ -19,11 +20,11 @@ const MOST_ANGLES: usize = 2048;
 
 /// Values in front of a table: numbers of vertical and horizontal angles, mean intensity, and largest vertical angle at which
 /// anything is sent. *Format.*
-const HEADER: usize = 4;
+pub(super) const HEADER: usize = 4;
 
 /// Widening of the largest vertical angle, in radians. *Proved*: covers the rounding of angles to single precision, 2e-7. A
 /// larger one culls less.
-const REACH_MARGIN: f32 = 1e-6;
+pub(super) const REACH_MARGIN: f32 = 1e-6;
 
 /// The intensity of a luminaire by direction, borrowed from the host: a goniometric diagram, as files of the format IESNA LM-63
 /// hold it.
@@ -161,10 +162,15 @@ fn width_of(horizontal: &[f32], column: usize) -> f64 {
 }
 
 /// Returns the direction at a vertical and a horizontal angle, in the frame of the profile.
-pub(super) fn direction_of_angles([vertical, horizontal]: [f64; 2]) -> [f64; 3] {
+fn direction_of_angles([vertical, horizontal]: [f64; 2]) -> [f64; 3] {
     let sin = |angle: f64| math::cos64(angle - 0.5 * PI64);
     let across = sin(vertical);
     [across * math::cos64(horizontal), across * sin(horizontal), math::cos64(vertical)]
+}
+
+/// Returns the vertical and the horizontal angle of a direction in the frame of the profile.
+pub(super) fn angles_of_direction([x, y, z]: [f64; 3]) -> [f64; 2] {
+    [math::atan2_64(math::sqrt64(x * x + y * y), z), math::atan2_64(y, x)]
 }
 
 /// All profiles of a scene on their way into a sampler.
@@ -221,10 +227,51 @@ pub(crate) struct Profiles<'a> {
     pub(super) values: &'a [f32],
 }
 
+/// Intensities by direction, from a profile or from a projection.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Distribution<'a> {
+    /// Mean intensity over all directions.
+    pub(super) mean: f32,
+    /// Largest angle from the axis at which anything is sent.
+    pub(super) reach: f32,
+    by: Table<'a>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Table<'a> {
+    Angles(ProfileTable<'a>),
+    Image(ProjectionTable<'a>),
+}
+
+impl Distribution<'_> {
+    /// Returns the intensity in a direction in the frame of the light.
+    pub(super) fn intensity(&self, direction: [f64; 3]) -> f32 {
+        match &self.by {
+            Table::Angles(table) => table.profile.intensity(angles_of_direction(direction)),
+            Table::Image(table) => table.intensity(direction),
+        }
+    }
+
+    /// Draws a unit direction in the frame of the light.
+    pub(super) fn sample(&self, u: [f64; 2]) -> [f64; 3] {
+        match &self.by {
+            Table::Angles(table) => direction_of_angles(table.sample(u)),
+            Table::Image(table) => table.sample(u),
+        }
+    }
+
+    /// Returns the density per solid angle with which [`Self::sample`] draws a direction.
+    pub(super) fn pdf(&self, direction: [f64; 3]) -> f64 {
+        match &self.by {
+            Table::Angles(table) => table.pdf(angles_of_direction(direction)),
+            Table::Image(table) => table.pdf(direction),
+        }
+    }
+}
+
 /// A profile as a sampler keeps it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ProfileTable<'a> {
-    header: [f32; HEADER],
     profile: Profile<'a>,
     /// Share of the power that leaves through each cell and those before it.
     sums: &'a [f32],
@@ -236,21 +283,19 @@ impl<'a> Profiles<'a> {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Returns a profile by its number, if its values are as many as they should be.
-    pub(super) fn get(&self, profile: u32) -> Option<ProfileTable<'a>> {
+    /// Returns a profile or a projection by its number, if its values are as many as they should be. The number of rows of a
+    /// projection is negative.
+    pub(super) fn get(&self, profile: u32) -> Option<Distribution<'a>> {
         let starts = self.starts.get(profile as usize..)?;
         let [start, end, ..] = starts else { return None };
         let (header, values) = self.values.get(*start as usize..*end as usize)?.split_first_chunk::<HEADER>()?;
-        let [rows, columns] = [header[0] as usize, header[1] as usize];
-        let cells = rows.checked_sub(1)?.checked_mul(columns)?;
-        let (vertical, values) = values.split_at_checked(rows)?;
-        let (horizontal, values) = values.split_at_checked(columns)?;
-        let (intensities, sums) = values.split_at_checked(cells + columns)?;
-        (sums.len() == cells).then_some(ProfileTable {
-            header: *header,
-            profile: Profile { vertical, horizontal, intensities },
-            sums,
-        })
+        let by = if header[0] < 0.0 {
+            Table::Image(ProjectionTable::new(*header, values)?)
+        } else {
+            Table::Angles(ProfileTable::new(*header, values)?)
+        };
+        let [_, _, mean, reach] = *header;
+        Some(Distribution { mean, reach, by })
     }
 
     /// Checks that the profile of a lamp exists.
@@ -272,14 +317,13 @@ impl<'a> Profiles<'a> {
         Error::unless_equal("number of starts of profiles", usize::from(self.starts.len() == 1), 0)?;
         for number in 0..self.count() {
             let fail = || Error::bytes("profile", number, 0, 0);
-            let ProfileTable { header: [_, _, mean, reach], profile, sums } =
-                self.get(number as u32).ok_or_else(fail)?;
-            let ascends = sums.windows(2).all(|pair| pair[0] <= pair[1]);
-            let is_sound = (0.0..=blas::MAX_AVERAGE).contains(&mean)
-                && (0.0..=PI).contains(&reach)
-                && ascends
-                && sums.iter().all(|sum| (0.0..=1.0).contains(sum));
-            if profile.check().is_err() || !is_sound {
+            let Distribution { mean, reach, by } = self.get(number as u32).ok_or_else(fail)?;
+            let is_sound = (0.0..=blas::MAX_AVERAGE).contains(&mean) && (0.0..=PI).contains(&reach);
+            let is_valid = match by {
+                Table::Angles(table) => table.is_valid(),
+                Table::Image(table) => table.is_valid(),
+            };
+            if !(is_sound && is_valid) {
                 return Err(fail());
             }
         }
@@ -287,20 +331,21 @@ impl<'a> Profiles<'a> {
     }
 }
 
-impl ProfileTable<'_> {
-    /// Mean intensity over all directions.
-    pub(super) fn mean(&self) -> f32 {
-        self.header[2]
+impl<'a> ProfileTable<'a> {
+    /// Returns the table of these values after a header, if there are as many as there should be.
+    fn new([rows, columns, ..]: [f32; HEADER], values: &'a [f32]) -> Option<Self> {
+        let [rows, columns] = [rows as usize, columns as usize];
+        let cells = rows.checked_sub(1)?.checked_mul(columns)?;
+        let (vertical, values) = values.split_at_checked(rows)?;
+        let (horizontal, values) = values.split_at_checked(columns)?;
+        let (intensities, sums) = values.split_at_checked(cells + columns)?;
+        (sums.len() == cells).then_some(Self { profile: Profile { vertical, horizontal, intensities }, sums })
     }
 
-    /// Largest vertical angle at which anything is sent.
-    pub(super) fn reach(&self) -> f32 {
-        self.header[3]
-    }
-
-    /// Returns the intensity at a vertical and a horizontal angle.
-    pub(super) fn intensity(&self, angles: [f64; 2]) -> f32 {
-        self.profile.intensity(angles)
+    /// Whether the values, which may come from outside, are those of a profile.
+    fn is_valid(&self) -> bool {
+        let ascends = self.sums.windows(2).all(|pair| pair[0] <= pair[1]);
+        self.profile.check().is_ok() && ascends && self.sums.iter().all(|sum| (0.0..=1.0).contains(sum))
     }
 
     /// Share of the power that leaves through a cell.
@@ -310,7 +355,7 @@ impl ProfileTable<'_> {
     }
 
     /// Draws a vertical and a horizontal angle: a cell by its power, and uniformly in its solid angle.
-    pub(super) fn sample(&self, [u1, u2]: [f64; 2]) -> [f64; 2] {
+    fn sample(&self, [u1, u2]: [f64; 2]) -> [f64; 2] {
         let Some(last) = self.sums.len().checked_sub(1) else { return [0.0; 2] };
         let total = f64::from(self.sums[last]);
         // The first cell whose end is beyond: never one without power.
@@ -327,7 +372,7 @@ impl ProfileTable<'_> {
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] draws a vertical and a horizontal angle.
-    pub(super) fn pdf(&self, [vertical, horizontal]: [f64; 2]) -> f64 {
+    fn pdf(&self, [vertical, horizontal]: [f64; 2]) -> f64 {
         let Some((row, _)) = row_at(self.profile.vertical, vertical) else { return 0.0 };
         let ([column, _], _) = columns_at(self.profile.horizontal, horizontal);
         let total = self.sums.last().map_or(0.0, |&total| f64::from(total));

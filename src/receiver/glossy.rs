@@ -29,27 +29,27 @@ use crate::math::{at_least, at_most, only_if, sqrt};
 /// Least roughness that guides. Chosen: cells of the deepest division are as large as such a lobe.
 ///
 /// Larger: smooth surfaces are guided less closely than can be. Smaller: the rounding of half vectors would show.
-const LEAST_ROUGHNESS: f32 = 1e-3;
+pub(super) const LEAST_ROUGHNESS: f32 = 1e-3;
 
 /// Least cosine of the outgoing direction. Chosen: against a division by zero.
 ///
 /// Larger: lobes of grazing views are blurred. Smaller: weights become as large as `f32` allows.
-const LEAST_OUTGOING: f32 = 1e-3;
+pub(super) const LEAST_OUTGOING: f32 = 1e-3;
 
 /// Share of the largest cosine, 1, that the lobe keeps as a weight wherever it is not below the horizon.
 ///
 /// Chosen with [`EVEN_SHARE`], which vanishes where the mean cosine does. Larger: more samples at the horizon. Smaller: what
 /// little of a cluster stands over the horizon of a lobe starves.
-const LEAST_WEIGHT: f32 = 1e-3;
+pub(super) const LEAST_WEIGHT: f32 = 1e-3;
 
 /// Least squared length of the sum of two unit vectors. *Proved*: rounding leaves as much of opposite ones.
-const LEAST_SUM2: f32 = 1e-7;
+pub(super) const LEAST_SUM2: f32 = 1e-7;
 
 /// Points along an edge of a triangle whose irradiance is found by its parts.
 ///
 /// Chosen. Larger: closer for narrow lobes next to large triangles, for a time in proportion to the square. Smaller: the
 /// opposite.
-const PARTS: usize = 4;
+pub(super) const PARTS: usize = 4;
 
 /// A surface with a glossy reflection over a diffuse base, seen from an outgoing direction.
 ///

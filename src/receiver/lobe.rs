@@ -92,6 +92,10 @@ macro_rules! for_lobe {
                 let $lobe = medium.lobe();
                 $call
             }
+            $crate::receiver::Receiver::Microfacet(surface) => {
+                let $lobe = surface.lobe();
+                $call
+            }
             _ => {
                 let $lobe = $crate::receiver::NoLobe;
                 $call

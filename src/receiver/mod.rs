@@ -10,6 +10,7 @@ mod glossy;
 mod lambert;
 mod lanes;
 mod lobe;
+mod microfacet;
 mod placed;
 mod scattering;
 mod surface;
@@ -23,6 +24,7 @@ pub use effort::Effort;
 pub use glossy::Glossy;
 pub(crate) use lanes::{LEAST_CLUSTER_COSINE, ReceiverLanes};
 pub(crate) use lobe::{Lobe, NoLobe, SPREAD_OF_RADIUS2, SPREAD_OF_SOLID_ANGLE, for_lobe};
+pub use microfacet::Microfacet;
 pub(crate) use placed::{PlacedLobe, RoundedPoint, own_receiver};
 pub use scattering::Scattering;
 use surface::Surface;
@@ -43,6 +45,8 @@ pub enum Receiver {
     Glossy(Glossy),
     /// A point in a medium with a phase function: what it scatters of the direction.
     Scattering(Scattering),
+    /// A surface with microfacet lobes, opaque or not: what it scatters of the direction.
+    Microfacet(Microfacet),
 }
 
 /// A position, and how a direction is weighted there.
@@ -81,13 +85,14 @@ impl Receiver {
             Self::Volume => Self::Volume,
             Self::Glossy(surface) => Self::Glossy(surface.map(map)),
             Self::Scattering(medium) => Self::Scattering(medium.map(map)),
+            Self::Microfacet(surface) => Self::Microfacet(surface.map(map)),
         }
     }
 
     /// Whether directions are favored beyond the cosine.
     #[inline]
     pub(crate) fn has_lobe(&self) -> bool {
-        matches!(self, Self::Glossy(_) | Self::Scattering(_))
+        matches!(self, Self::Glossy(_) | Self::Scattering(_) | Self::Microfacet(_))
     }
 }
 
@@ -105,7 +110,8 @@ impl ShadingPoint {
             // Without a lobe, the loops need not look for one.
             Receiver::Glossy(surface) if !surface.has_lobe() => Receiver::Surface(surface.normal()),
             Receiver::Scattering(medium) if !medium.has_lobe() => Receiver::Volume,
-            receiver @ (Receiver::Glossy(_) | Receiver::Scattering(_)) => receiver,
+            Receiver::Microfacet(surface) if !surface.has_lobe() => surface.without_lobe(),
+            receiver @ (Receiver::Glossy(_) | Receiver::Scattering(_) | Receiver::Microfacet(_)) => receiver,
         };
         Self { position, receiver, groups: ALL_GROUPS, effort: Effort::Full, time: 0.0 }
     }
@@ -188,6 +194,12 @@ impl ShadingPoint {
         Self::new(position, Receiver::Scattering(medium))
     }
 
+    /// Returns a point on a surface with microfacet lobes, which may transmit.
+    #[must_use]
+    pub fn microfacet(position: Vec3, surface: Microfacet) -> Self {
+        Self::new(position, Receiver::Microfacet(surface))
+    }
+
     /// Returns the cosine of a unit direction that points away from this point: clamped on opaque surfaces, absolute on
     /// transmissive ones, and 1 in a medium.
     ///
@@ -197,6 +209,7 @@ impl ShadingPoint {
         match self.receiver {
             Receiver::Glossy(surface) => Receiver::Surface(surface.normal()).weight(direction),
             Receiver::Scattering(_) => 1.0,
+            Receiver::Microfacet(surface) => surface.without_lobe().weight(direction),
             receiver => receiver.weight(direction),
         }
     }
@@ -321,6 +334,7 @@ macro_rules! dispatch {
             }
             Receiver::Glossy($kind) => $call,
             Receiver::Scattering($kind) => $call,
+            Receiver::Microfacet($kind) => $call,
         }
     };
 }

@@ -138,6 +138,8 @@ pub(crate) fn own_receiver(receiver: Receiver, linear: &DMat3) -> (Receiver, f64
         Receiver::Surface(_) | Receiver::Glossy(_) => Receiver::Surface(unit),
         Receiver::Transmissive(_) => Receiver::Transmissive(unit),
         Receiver::Volume | Receiver::Scattering(_) => Receiver::Volume,
+        Receiver::Microfacet(_) if receiver.has_horizon() => Receiver::Surface(unit),
+        Receiver::Microfacet(_) => Receiver::Transmissive(unit),
     };
     (own, normal.length())
 }

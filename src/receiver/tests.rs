@@ -150,6 +150,7 @@ fn brute_force(receiver: Receiver, vertices: [Vec3; 3]) -> f64 {
                         let g: f64 = PHASE;
                         (1.0 - g * g) / (1.0 + g * g + 2.0 * g * direction.x).powf(1.5)
                     }
+                    Receiver::Microfacet(_) => unreachable!("these have tests of their own"),
                 };
                 sum += weight * direction.dot(cross).abs() * 0.5 / d2 * step * step;
             }

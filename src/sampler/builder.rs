@@ -7,7 +7,7 @@ use super::lights::LightSampler;
 use crate::blas::{Procedural, Texture};
 use crate::env::{Environment, RegionMoments};
 use crate::error::Error;
-use crate::light::{Energies, Illumination, Instance, Lamp, LightCollection, Mesh, Profile};
+use crate::light::{Energies, Illumination, Instance, Lamp, LightCollection, Mesh, Profile, Projection};
 use crate::parallel;
 use crate::progress::{Progress, Report};
 use crate::receiver::ALL_GROUPS;
@@ -189,6 +189,17 @@ impl<'a> LightSamplerBuilder<'a> {
     /// an intensity is negative, not finite or above 1e30, or missing.
     pub fn add_profile(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
         self.collection.add_profile(profile)
+    }
+
+    /// Adds an image that [`ProfileLight`](crate::ProfileLight)s can project, in the place of a profile: both are numbered
+    /// together. After an error the builder is as it was before.
+    ///
+    /// # Errors
+    ///
+    /// If the image has no texels, more than 2048 along an edge, or another number of intensities than its size says, an angle of
+    /// view is out of its range, or an intensity is negative, not finite or above 1e30.
+    pub fn add_projection(&mut self, projection: &Projection<'_>) -> Result<ProfileId, Error> {
+        self.collection.add_projection(projection)
     }
 
     /// Adds a light that is not made of triangles: see [`Lamp`]. After an error the builder is as it was before.

@@ -1,6 +1,8 @@
 //! A density that `sample` reports is the density that is found for the same point later.
 
-use crate::common::hostile::{MOVED, hostile, random_scene, shading_point, shading_point_with_lobe};
+use crate::common::hostile::{
+    MOVED, hostile, random_scene, shading_point, shading_point_with_lobe, shading_point_with_microfacets,
+};
 use crate::common::lights::{ARITIES, Point, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
@@ -85,14 +87,16 @@ impl Counts {
     }
 }
 
+/// Makes the shading point of a number.
+type MakePoint = fn(usize, &Scene, &mut Pcg32) -> ShadingPoint;
+
 /// Samples of one random scene. One of `every` is also looked up as a direction.
-fn examine(number: usize, samples: usize, every: usize, has_lobe: bool) -> Counts {
+fn examine(number: usize, samples: usize, every: usize, make: MakePoint) -> Counts {
     let mut pcg = Pcg32::new(number as u64, 15);
     let scene = random_scene(number, &mut pcg);
     let lights = build(&scene, ARITIES[number % ARITIES.len()]);
     let mut counts = Counts::default();
     for point in 0..POINTS {
-        let make = if has_lobe { shading_point_with_lobe } else { shading_point };
         let x = make(number + point, &scene, &mut pcg);
         let at = lights.at(&x);
         for i in 0..samples / POINTS {
@@ -116,9 +120,9 @@ fn examine(number: usize, samples: usize, every: usize, has_lobe: bool) -> Count
     counts
 }
 
-fn examine_all(scenes: usize, samples: usize, every: usize, has_lobe: bool) {
+fn examine_all(scenes: usize, samples: usize, every: usize, make: MakePoint) {
     let mut all = Counts::default();
-    parallel::map(scenes, |i| examine(i, samples, every, has_lobe)).into_iter().for_each(|counts| all.add(counts));
+    parallel::map(scenes, |i| examine(i, samples, every, make)).into_iter().for_each(|counts| all.add(counts));
     println!(
         "{} samples, {} of them None: {} mismatches, worst {:e}, {} not finite; {} directions: {} below the sample's \
          density, {} found with another",
@@ -135,26 +139,38 @@ fn examine_all(scenes: usize, samples: usize, every: usize, has_lobe: bool) {
 #[test]
 fn samples_have_the_density_that_pdf_finds() {
     let [scenes, samples] = tier().agreement;
-    examine_all(scenes, samples, 2, false);
+    examine_all(scenes, samples, 2, shading_point);
 }
 
 #[test]
 fn samples_for_lobes_have_the_density_that_pdf_finds() {
     let [scenes, samples] = tier().agreement;
     // Densities are those of other trees all the same: four million are enough.
-    examine_all(scenes, samples * 2 / 5, 2, true);
+    examine_all(scenes, samples * 2 / 5, 2, shading_point_with_lobe);
+}
+
+#[test]
+fn samples_for_microfacets_have_the_density_that_pdf_finds() {
+    let [scenes, samples] = tier().agreement;
+    examine_all(scenes, samples / 5, 2, shading_point_with_microfacets);
 }
 
 #[test]
 #[ignore = "by hand: 10^8 samples take minutes; cargo test --release --test suite -- --ignored a_hundred_million"]
 fn a_hundred_million_samples_have_the_density_that_pdf_finds() {
-    examine_all(400, 250_000, 10, false);
+    examine_all(400, 250_000, 10, shading_point);
 }
 
 #[test]
 #[ignore = "by hand: 10^8 samples take minutes; cargo test --release --test suite -- --ignored a_hundred_million"]
 fn a_hundred_million_samples_for_lobes_have_the_density_that_pdf_finds() {
-    examine_all(400, 250_000, 10, true);
+    examine_all(400, 250_000, 10, shading_point_with_lobe);
+}
+
+#[test]
+#[ignore = "by hand: 10^8 samples take minutes; cargo test --release --test suite -- --ignored a_hundred_million"]
+fn a_hundred_million_samples_for_microfacets_have_the_density_that_pdf_finds() {
+    examine_all(400, 250_000, 10, shading_point_with_microfacets);
 }
 
 #[test]

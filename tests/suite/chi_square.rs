@@ -4,7 +4,7 @@ use crate::common::density::{OnTriangle, bin, id, probes};
 use crate::common::lights::{ARITIES, build, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
-use crate::common::scene::{Content, LEAST_EFFORT, LOBES, Scene, point_of_kind, random_point};
+use crate::common::scene::{Content, LEAST_EFFORT, LOBES, MICROFACETS, Scene, point_of_kind, random_point};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
 use crate::common::tier::{few, some, tier};
 use fanlight::{Arity, Hit, ShadingPoint, Splitting};
@@ -14,8 +14,6 @@ use glam::Vec3;
 const SIGNIFICANCE: f64 = 0.01;
 /// Triangles are cut into 4^DEPTH cells.
 const DEPTH: u32 = 2;
-/// Least roughness of lobes whose densities the integration resolves.
-const LEAST_ROUGHNESS: f32 = 0.1;
 /// Samples of each cell that guide the integration.
 const PROBES: f64 = 50.0;
 
@@ -26,7 +24,7 @@ fn cells(content: Content, number: usize, receiver: usize, wrong: bool) -> (f64,
     let scene = Scene::random(&mut pcg, content);
     let arities = ARITIES[number % ARITIES.len()];
     let lights = build(&scene, arities);
-    let x = point_of_kind(&mut pcg, receiver, LEAST_ROUGHNESS);
+    let x = point_of_kind(&mut pcg, receiver);
     let bins = 1 << (2 * DEPTH);
     let samples = tier().histogram;
     let mut firsts = Vec::new();
@@ -110,6 +108,11 @@ fn samples_for_lobes_fill_the_cells_of_triangles_as_the_density_says() {
 #[test]
 fn samples_of_the_least_effort_fill_the_cells_of_triangles_as_the_density_says() {
     check_cells(LEAST_EFFORT, few);
+}
+
+#[test]
+fn samples_for_microfacets_fill_the_cells_of_triangles_as_the_density_says() {
+    check_cells(MICROFACETS, few);
 }
 
 /// With three kinds of receivers from `first` on.

@@ -4,7 +4,7 @@
 //! or, without `std`, from `libm`, so that there is a list for each, and they hold for the system that they were made on.
 use std::path::Path;
 
-use crate::common::hostile::{random_scene, shading_point, shading_point_with_lobe};
+use crate::common::hostile::{random_scene, shading_point, shading_point_with_lobe, shading_point_with_microfacets};
 use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
@@ -14,6 +14,7 @@ use crate::instances;
 use crate::instances::town::Town;
 use crate::kinds::{mixed, pdf_again};
 use crate::motion::shutter::Moving;
+use crate::projections::projectors;
 use fanlight::{
     Effort, LightSample, LightSampler, MeshId, RaySegment, ShadingPoint, Splitting, TriangleId, Visibility,
 };
@@ -35,6 +36,11 @@ const LEAST: usize = 12;
 const MOVING: usize = 6;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
+/// Scenes at points with microfacets, after those at points with lobes.
+const MICROFACETS: usize = 20;
+/// Scenes with projections, at last.
+const PROJECTIONS: usize = 6;
+
 /// The same scenes at points with lobes.
 const LOBES: &str = if cfg!(feature = "std") { "lobes-std.txt" } else { "lobes-libm.txt" };
 
@@ -93,14 +99,13 @@ fn ask_environment(scene: &Scene, pcg: &mut Pcg32, hash: &mut Hash) {
 }
 
 /// One line about one scene.
-fn line(number: usize, has_lobes: bool) -> String {
+fn line(number: usize, make: fn(usize, &Scene, &mut Pcg32) -> ShadingPoint) -> String {
     let mut pcg = Pcg32::new(number as u64, 81);
     let scene = random_scene(number, &mut pcg);
     let arity = ARITIES[number % ARITIES.len()];
     let lights = build(&scene, arity);
     let mut hash = Hash::new();
     let mut drawn = 0;
-    let make = if has_lobes { shading_point_with_lobe } else { shading_point };
     let points: Vec<_> = (0..POINTS).map(|i| make(number + i, &scene, &mut pcg)).collect();
     for x in &points {
         drawn += ask(&lights, x, &mut pcg, &mut hash);
@@ -261,6 +266,28 @@ fn line_of_motion(number: usize) -> String {
     format!("{number:2} motion {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene of projectors.
+fn line_of_projections(number: usize) -> String {
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let lights = projectors(number, &mut pcg);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    let emission = lights.emission();
+    for i in 0..POINTS {
+        let x = random_point(&mut pcg, i);
+        let at = lights.at(&x);
+        if let Some(sample) = at.sample(pcg.cube()) {
+            drawn += 1;
+            let id = sample.light.id().map_or(u32::MAX, |id| id.index());
+            hash.add(&[f32::from_bits(id), sample.distance, sample.pdf, sample.pmf, pdf_again(&at, &sample)]);
+        }
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            hash.add(&ray.direction.to_array());
+            hash.add(&[ray.pdf, ray.pmf]);
+        }
+    }
+    format!("{number:2} projections {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -275,7 +302,7 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 type Lines = Box<dyn Fn(usize) -> String + Sync>;
 
 /// What is listed after the random scenes: how many lines, and each.
-fn more() -> [(usize, Lines); 6] {
+fn more() -> [(usize, Lines); 7] {
     [
         (KINDS, Box::new(line_of_kinds)),
         (GROUPS, Box::new(line_of_groups)),
@@ -283,13 +310,19 @@ fn more() -> [(usize, Lines); 6] {
         (TOWNS, Box::new(line_of_town)),
         (LEAST, Box::new(line_of_least)),
         (MOVING, Box::new(line_of_motion)),
+        (PROJECTIONS, Box::new(line_of_projections)),
     ]
 }
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let of_scenes: (usize, Lines) = (SCENES, Box::new(move |i| line(i, has_lobes)));
-    let lists = if has_lobes { vec![of_scenes] } else { [of_scenes].into_iter().chain(more()).collect() };
+    let random = |shading_point| Box::new(move |i| line(i, shading_point)) as Lines;
+    let mut lists = vec![(SCENES, random(if has_lobes { shading_point_with_lobe } else { shading_point }))];
+    if has_lobes {
+        lists.push((MICROFACETS, random(shading_point_with_microfacets)));
+    } else {
+        lists.extend(more());
+    }
     let all: Vec<_> = lists.iter().flat_map(|(count, line)| (0..*count).map(move |i| (line, i))).collect();
     let found = parallel::map(all.len(), |k| all[k].0(all[k].1)).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {

@@ -6,7 +6,7 @@
 
 use crate::common::lights::{ARITIES, build, sample_split};
 use crate::common::pcg::Pcg32;
-use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky, random_point, with_lobe};
+use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky, random_point, with_lobe, with_microfacets};
 use crate::common::statistics::Mean;
 use crate::common::tier::tier;
 use crate::common::{oracle, parallel};
@@ -306,6 +306,25 @@ fn phase_functions() {
         (scene, with_lobe(x, pcg, 0.05))
     };
     assert_unbiased(&Case { name: "phase functions", scene, integral: over_lights, estimator: Estimator::Point });
+}
+
+#[test]
+fn anisotropic_surfaces() {
+    let scene = |pcg: &mut Pcg32, _| {
+        let (scene, x) = mixture(pcg, 0);
+        (scene, with_microfacets(x, pcg, 0.1))
+    };
+    assert_unbiased(&Case { name: "anisotropic surfaces", scene, integral: over_lights, estimator: Estimator::Point });
+}
+
+/// Reflection, transmission, and a diffuse base.
+#[test]
+fn rough_glass() {
+    let scene = |pcg: &mut Pcg32, _| {
+        let (scene, x) = mixture(pcg, 1);
+        (scene, with_microfacets(x, pcg, 0.1))
+    };
+    assert_unbiased(&Case { name: "rough glass", scene, integral: over_lights, estimator: Estimator::Point });
 }
 
 /// The host's lobe need not be the one that guides.

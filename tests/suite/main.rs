@@ -33,6 +33,7 @@ mod near;
 mod normalisation;
 mod procedural;
 mod profiles;
+mod projections;
 mod properties;
 mod refit;
 mod segments;

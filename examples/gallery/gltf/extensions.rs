@@ -5,7 +5,8 @@ use super::notes::Notes;
 use crate::render::Error;
 
 /// Those that the other files of this folder look for: to honor them, or to say what cannot be.
-pub(super) const KNOWN: [&str; 18] = [
+pub(super) const KNOWN: [&str; 19] = [
+    "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_avif",

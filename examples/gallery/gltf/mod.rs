@@ -22,6 +22,7 @@ mod lamps;
 mod meshopt;
 mod notes;
 mod primitive;
+mod profiles;
 mod read;
 mod skin;
 mod surface;

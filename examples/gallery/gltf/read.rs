@@ -16,7 +16,7 @@ use super::notes::Notes;
 use super::primitive::{self, Wanted};
 use super::surface::{Map, Reading, Surface};
 use super::texture::Mapping;
-use super::{container, extensions, lamps, skin};
+use super::{container, extensions, lamps, profiles, skin};
 use crate::render::{Camera, Copies, Error, Material, Mesh, Model, Sky};
 
 /// Longest side of a scene: what is further than a thousand kilometers is a mistake in its units.
@@ -270,6 +270,15 @@ impl Reader<'_> {
         for index in self.hierarchy.visible.clone() {
             let node = &self.document.nodes[index];
             let within = |error: Error| Error::from(format!("{}: {error}", self.document.node(index)));
+            let profiled = profiles::of_node(&self.data, node, &self.hierarchy.globals[index]).map_err(within)?;
+            if let Some((lamp, described)) = profiled {
+                let global = self.hierarchy.globals[index];
+                if !global.is_finite() || global.w_axis.truncate().abs().max_element() > LARGEST {
+                    return Err(within(format!("{described} is at {}", global.w_axis.truncate()).into()));
+                }
+                self.model.lamps.push(lamp);
+                self.contents.push(format!("{}: {described}", self.document.node(index)));
+            }
             let Some((lamp, called)) = lamps::of_node(self.document, node).map_err(within)? else { continue };
             let global = self.hierarchy.globals[index];
             if !global.is_finite() || global.w_axis.truncate().abs().max_element() > LARGEST {

@@ -8,7 +8,8 @@ use super::point::PointView;
 use super::{LampFault, LampKind, Reach, ShapeView, VALUES, check_axis, check_position, check_weight, within};
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
-use crate::light::profile::{Profile, Profiles, direction_of_angles};
+use crate::light::profile::{Profile, Profiles, angles_of_direction};
+use crate::light::projection::Projection;
 use crate::math;
 use crate::receiver::ShadingPoint;
 use crate::record::ProfileId;
@@ -57,7 +58,13 @@ impl ProfileLight {
     /// Returns the intensity in a unit direction in which light travels, by the light's profile.
     #[must_use]
     pub fn intensity_towards(&self, profile: &Profile<'_>, direction: Vec3) -> f32 {
-        self.scale * profile.intensity(self.angles(direction.as_dvec3()))
+        self.scale * profile.intensity(angles_of_direction(self.local(direction.as_dvec3())))
+    }
+
+    /// Returns the intensity in a unit direction in which light travels, by the light's projection.
+    #[must_use]
+    pub fn intensity_through(&self, projection: &Projection<'_>, direction: Vec3) -> f32 {
+        self.scale * projection.intensity_towards(self.local(direction.as_dvec3()))
     }
 
     /// Returns the number of the profile.
@@ -74,10 +81,9 @@ impl ProfileLight {
         [s * cos + t * sin, t * cos - s * sin, axis]
     }
 
-    /// Vertical and horizontal angle of a direction.
-    fn angles(&self, direction: DVec3) -> [f64; 2] {
-        let [x, y, z] = self.frame().map(|axis| axis.dot(direction));
-        [math::atan2_64(math::sqrt64(x * x + y * y), z), math::atan2_64(y, x)]
+    /// A direction in the frame of the light.
+    fn local(&self, direction: DVec3) -> [f64; 3] {
+        self.frame().map(|axis| axis.dot(direction))
     }
 }
 
@@ -115,11 +121,11 @@ impl LampKind for ProfileLight {
     }
 
     fn area(&self, profiles: Profiles<'_>) -> f32 {
-        AREA * profiles.get(self.profile).map_or(0.0, |table| table.mean())
+        AREA * profiles.get(self.profile).map_or(0.0, |table| table.mean)
     }
 
     fn reach(&self, profiles: Profiles<'_>) -> Reach {
-        let emission = profiles.get(self.profile).map_or(PI, |table| table.reach());
+        let emission = profiles.get(self.profile).map_or(PI, |table| table.reach);
         let is_focused = emission < WIDEST_CONE;
         Reach {
             aabb: Aabb { min: self.position, max: self.position },
@@ -135,7 +141,7 @@ impl LampKind for ProfileLight {
 
     fn view(&self, x: &ShadingPoint, profiles: Profiles<'_>) -> Option<ShapeView> {
         let table = profiles.get(self.profile)?;
-        let intensity = |direction| table.intensity(self.angles(direction)).into();
+        let intensity = |direction| table.intensity(self.local(direction)).into();
         PointView::new(self.position, x.position, intensity).map(ShapeView::Point)
     }
 
@@ -144,14 +150,14 @@ impl LampKind for ProfileLight {
     }
 
     fn emit(&self, _point: [Variate; 2], direction: [Variate; 2], _side: f64, profiles: Profiles<'_>) -> EmittedRay {
-        let angles = profiles.get(self.profile).map_or([0.0; 2], |table| table.sample(direction.map(|u| u.value())));
-        let [x, y, z] = direction_of_angles(angles);
+        let [x, y, z] =
+            profiles.get(self.profile).map_or([0.0, 0.0, 1.0], |table| table.sample(direction.map(|u| u.value())));
         let [right, front, axis] = self.frame();
         let direction = (right * x + front * y + axis * z).as_vec3();
         EmittedRay::from_point(self.position, direction, self.emission_pdf(direction, profiles))
     }
 
     fn emission_pdf(&self, direction: Vec3, profiles: Profiles<'_>) -> f64 {
-        profiles.get(self.profile).map_or(0.0, |table| table.pdf(self.angles(direction.as_dvec3())))
+        profiles.get(self.profile).map_or(0.0, |table| table.pdf(self.local(direction.as_dvec3())))
     }
 }

@@ -4,8 +4,8 @@ use std::sync::OnceLock;
 
 use fanlight::{
     DiskLight, DistantLight, Environment, Filter, Illumination, Instance, Lamp, LightSample, LightSampler,
-    LightSamplerBuilder, Mesh, PointLight, Profile, ProfileLight, ShadingPoint, Sides, SphereLight, SpotLight, Texture,
-    TextureId, TubeLight, Visibility, Weight, Wrap,
+    LightSamplerBuilder, Mesh, PointLight, Profile, ProfileLight, Projection, ShadingPoint, Sides, SphereLight,
+    SpotLight, Texture, TextureId, TubeLight, Visibility, Weight, Wrap,
 };
 use glam::{Affine3A, Mat3, Quat, Vec2, Vec3, Vec3Swizzles};
 
@@ -91,6 +91,11 @@ fn some_lights(kind: u8) -> LightSampler {
         builder.add_light_to(1, DistantLight::new(Vec3::Z, 1.0).angular_radius(0.1)).expect("a valid light");
         let end: Vec<Vec3> = positions.iter().map(|p| *p + p.yzx()).collect();
         builder.add_mesh(&mesh.moving_to(&end)).expect("a valid mesh");
+        let intensities = [1.0, 0.0, 0.5, 0.0, 0.0, 2.0];
+        let slide =
+            Projection { angles: [1.0, 0.8], size: [3, 2], intensities: &intensities, filter: Filter::Bilinear };
+        let slide = builder.add_projection(&slide).expect("a valid projection");
+        builder.add_light(ProfileLight::new(Vec3::Y, Vec3::X, slide, 1.0)).expect("a valid light");
     }
     // An instance of every other kind.
     if kind & 1 == kind >> 2 & 1 {
@@ -183,6 +188,12 @@ impl Soup {
         let (weight, size) = (self.weight.unwrap_or(1.0), self.uvs[0].x);
         Some(match self.positions.len() % 5 {
             0 if self.sides == Sides::Two => DistantLight::new(*a, weight).angular_radius(size).into(),
+            1 if self.sides == Sides::Two && self.portal => {
+                let intensities = [weight, 0.0, 1.0, size, b.y, 0.0];
+                let filter = if size > 0.5 { Filter::Nearest } else { Filter::Bilinear };
+                let slide = Projection { angles: [b.x, 3.0 * size], size: [2, 3], intensities: &intensities, filter };
+                ProfileLight::new(*a, *b, builder.add_projection(&slide).ok()?, weight).facing(*a).into()
+            }
             1 if self.sides == Sides::Two => {
                 let profile =
                     Profile { vertical: &[0.0, b.x], horizontal: &[0.0, b.y], intensities: &[weight, 0.0, 1.0, size] };

@@ -4,10 +4,10 @@ pub(crate) mod build;
 pub(crate) mod reader;
 
 use fanlight::{
-    Glossy, LightSample, LightSampler, LightSamplerView, RaySegment, Receiver, SampledLight, Scattering, ShadingPoint,
-    Splitting, VisibilityView,
+    Glossy, LightSample, LightSampler, LightSamplerView, Microfacet, RaySegment, Receiver, SampledLight, Scattering,
+    ShadingPoint, Splitting, VisibilityView,
 };
-use glam::Vec3;
+use glam::{Vec3, Vec3Swizzles};
 use reader::Reader;
 use smallvec::SmallVec;
 
@@ -89,8 +89,19 @@ fn receiver(reader: &mut Reader<'_>) -> Receiver {
         1 => Receiver::Transmissive(normal),
         2 => Receiver::Volume,
         3 => {
-            let surface = Glossy::new(normal, reader.vector(), reader.float());
-            Receiver::Glossy(surface.with_weights(reader.float(), reader.float()))
+            let (outgoing, roughness, weights) = (reader.vector(), reader.float(), [reader.float(), reader.float()]);
+            let surface = Glossy::new(normal, outgoing, roughness).with_weights(weights[0], weights[1]);
+            // By no byte of its own, so that inputs that were found keep their meaning.
+            match roughness.to_bits() % 3 {
+                0 => Receiver::Microfacet(surface.anisotropic(outgoing.zxy(), [roughness, weights[0]])),
+                1 => Receiver::Microfacet(
+                    Microfacet::from(surface)
+                        .anisotropic(outgoing.yzx(), [roughness, weights[1]])
+                        .with_weights(weights[1], weights[0], roughness)
+                        .with_ior(2.0 * outgoing.x),
+                ),
+                _ => Receiver::Glossy(surface),
+            }
         }
         _ => Receiver::Scattering(Scattering::new(reader.vector(), reader.float())),
     }
@@ -162,6 +173,7 @@ fn is_ordinary(x: &ShadingPoint) -> bool {
         && match x.receiver {
             Receiver::Surface(normal) | Receiver::Transmissive(normal) => (normal.length() - 1.0).abs() < 1e-5,
             Receiver::Glossy(surface) => (surface.normal().length() - 1.0).abs() < 1e-5,
+            Receiver::Microfacet(surface) => (surface.normal().length() - 1.0).abs() < 1e-5,
             _ => true,
         }
 }

@@ -4,7 +4,7 @@ use fanlight::ShadingPoint;
 use glam::Vec3;
 
 use super::pcg::Pcg32;
-use super::scene::{Content, Scene, random_point, with_lobe};
+use super::scene::{Content, Scene, random_point, with_lobe, with_microfacets};
 
 /// Scenes by their number modulo 8 that are squeezed to slivers, moved a thousand units away, or shrunk.
 pub(crate) const MOVED: [usize; 3] = [FLAT, FAR, SMALL];
@@ -63,4 +63,10 @@ pub(crate) fn shading_point(number: usize, scene: &Scene, pcg: &mut Pcg32) -> Sh
 pub(crate) fn shading_point_with_lobe(number: usize, scene: &Scene, pcg: &mut Pcg32) -> ShadingPoint {
     let x = shading_point(number, scene, pcg);
     with_lobe(x, pcg, 1e-4)
+}
+
+/// The same points with microfacets, down to mirrors and to clear glass.
+pub(crate) fn shading_point_with_microfacets(number: usize, scene: &Scene, pcg: &mut Pcg32) -> ShadingPoint {
+    let x = shading_point(number, scene, pcg);
+    with_microfacets(x, pcg, 1e-4)
 }

@@ -1,6 +1,6 @@
 //! Irradiance in double precision, from a scene's description alone.
 
-use fanlight::{Filter, Glossy, Receiver, ShadingPoint, Wrap};
+use fanlight::{Filter, Glossy, Microfacet, Receiver, ShadingPoint, Wrap};
 use glam::{DVec2, DVec3};
 
 use super::scene::{Image, LightMesh, Paint, Scene, Sky};
@@ -15,6 +15,7 @@ pub(crate) fn cosine(receiver: &Receiver, direction: DVec3) -> f64 {
         Receiver::Transmissive(normal) => normal.as_dvec3().dot(direction).abs(),
         Receiver::Volume => 1.0,
         Receiver::Glossy(surface) => glossy(&surface, direction),
+        Receiver::Microfacet(surface) => microfacets(&surface, direction),
         Receiver::Scattering(medium) => {
             let (g, cosine) = (f64::from(medium.asymmetry()), medium.outgoing().as_dvec3().dot(direction));
             (1.0 - g * g) / (1.0 + g * g + 2.0 * g * cosine).powf(1.5)
@@ -39,6 +40,38 @@ fn glossy(surface: &Glossy, direction: DVec3) -> f64 {
     let lambda = |cos: f64| 0.5 * ((1.0 + alpha2 * (1.0 - cos * cos).max(0.0) / (cos * cos)).sqrt() - 1.0);
     let masking = 1.0 / (1.0 + lambda(cos_i) + lambda(cos_o));
     kd * cos_i + ks * distribution * masking / (4.0 * cos_o)
+}
+
+/// `π f |cos θ|` of a diffuse base, a reflection and a transmission, as Walter et al. 2007 (with the index on the side of the
+/// light squared) and Heitz 2014 have it, by Smith's Λ.
+fn microfacets(surface: &Microfacet, direction: DVec3) -> f64 {
+    let (n, t) = (surface.normal().as_dvec3(), surface.tangent().as_dvec3());
+    let local = |v: DVec3| DVec3::new(t.dot(v), n.cross(t).dot(v), n.dot(v));
+    let (o, i) = (local(surface.outgoing().as_dvec3()), local(direction));
+    let [x2, y2] = surface.roughness().map(|alpha| f64::from(alpha).powi(2));
+    let [kd, ks, kt] = surface.weights().map(f64::from);
+    let ior = f64::from(surface.ior());
+    // π D, where D cos² is the density of slopes.
+    let distribution = |h: DVec3| 1.0 / ((x2 * y2).sqrt() * (h.x * h.x / x2 + h.y * h.y / y2 + h.z * h.z).powi(2));
+    let lambda = |v: DVec3| 0.5 * ((1.0 + (x2 * v.x * v.x + y2 * v.y * v.y) / (v.z * v.z)).sqrt() - 1.0);
+    let masking = 1.0 / (1.0 + lambda(i) + lambda(o));
+    let reflected = |i: DVec3| distribution((i + o).normalize()) * masking / (4.0 * o.z);
+    if i.z > 0.0 {
+        return kd * i.z + ks * reflected(i);
+    }
+    if kt == 0.0 || i.z == 0.0 {
+        return 0.0;
+    }
+    if ior == 1.0 {
+        return kt * reflected(i * DVec3::new(1.0, 1.0, -1.0));
+    }
+    let sum = o + ior * i;
+    let h = if sum.z < 0.0 { -sum.normalize() } else { sum.normalize() };
+    if h.dot(o) <= 0.0 || h.dot(i) >= 0.0 {
+        return 0.0;
+    }
+    let jacobian = ior * ior * (h.dot(o) * h.dot(i)).abs() / (h.dot(o) + ior * h.dot(i)).powi(2);
+    kt * distribution(h) * masking * jacobian / o.z
 }
 
 fn wrapped(wrap: Wrap, index: i64, n: usize) -> usize {
@@ -197,6 +230,7 @@ fn cut(
     let normal = match *receiver {
         Receiver::Surface(normal) => Some(normal),
         Receiver::Glossy(surface) => Some(surface.normal()),
+        Receiver::Microfacet(surface) if surface.weights()[2] == 0.0 => Some(surface.normal()),
         _ => None,
     };
     if let Some(normal) = normal {

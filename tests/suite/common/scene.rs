@@ -1,8 +1,8 @@
 //! Scenes as plain descriptions, from which a sampler is built and an oracle computes.
 
 use fanlight::{
-    Arity, Effort, Environment, Filter, Glossy, Illumination, LightSampler, LightSamplerBuilder, Mesh, Receiver,
-    Scattering, ShadingPoint, Sides, Texture, Weight, Wrap,
+    Arity, Effort, Environment, Filter, Glossy, Illumination, LightSampler, LightSamplerBuilder, Mesh, Microfacet,
+    Receiver, Scattering, ShadingPoint, Sides, Texture, Weight, Wrap,
 };
 use glam::{Mat3, Vec2, Vec3};
 
@@ -274,16 +274,24 @@ pub(crate) fn random_point(pcg: &mut Pcg32, kind: usize) -> ShadingPoint {
 
 /// Number of the first kind of [`point_of_kind`] with a lobe; those below have none.
 pub(crate) const LOBES: usize = 3;
+/// Number of its first kind with microfacets.
+pub(crate) const MICROFACETS: usize = 6;
 /// Number of its first kind with the least effort.
-pub(crate) const LEAST_EFFORT: usize = 6;
+pub(crate) const LEAST_EFFORT: usize = 9;
 
-/// A random point of one of nine kinds: three receivers, the same with lobes of at least this roughness, the first again with
-/// the least effort.
-pub(crate) fn point_of_kind(pcg: &mut Pcg32, kind: usize, roughness: f32) -> ShadingPoint {
+/// Least roughness of lobes whose densities an integration resolves.
+const LEAST_ROUGHNESS: f32 = 0.1;
+/// The same of microfacets, which are narrower along an axis and in a refraction.
+const LEAST_MICROFACETS: f32 = 0.3;
+
+/// A random point of one of twelve kinds: three receivers, the same with lobes and with microfacets, the first again with the
+/// least effort.
+pub(crate) fn point_of_kind(pcg: &mut Pcg32, kind: usize) -> ShadingPoint {
     let x = random_point(pcg, kind);
     match kind {
         0..LOBES => x,
-        LOBES..LEAST_EFFORT => with_lobe(x, pcg, roughness),
+        LOBES..MICROFACETS => with_lobe(x, pcg, LEAST_ROUGHNESS),
+        MICROFACETS..LEAST_EFFORT => with_microfacets(x, pcg, LEAST_MICROFACETS),
         _ => x.with_effort(Effort::Least),
     }
 }
@@ -305,4 +313,32 @@ pub(crate) fn with_lobe(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> Shading
     };
     let diffuse = if kind % 2 == 0 { 0.0 } else { pcg.f32() };
     ShadingPoint::glossy(x.position, Glossy::new(normal, outgoing, roughness).with_weights(diffuse, 1.0))
+}
+
+/// The same point with microfacets of roughnesses between `least` and 1 along a tangent and across: opaque in place of a
+/// surface, and with a transmission in place of all others.
+pub(crate) fn with_microfacets(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> ShadingPoint {
+    let (any, tangent, kind) = (pcg.direction(), pcg.direction(), pcg.below(8));
+    let (normal, transmits) = match x.receiver {
+        Receiver::Surface(normal) => (normal, false),
+        Receiver::Transmissive(normal) => (normal, true),
+        _ => (pcg.direction(), true),
+    };
+    let above = if any.dot(normal) < 0.0 { -any } else { any };
+    let outgoing = match kind {
+        // Grazing, below the horizon, and straight above.
+        0 => above - (1.0 - 1e-4) * normal * above.dot(normal),
+        1 => -above,
+        2 => normal,
+        _ => above,
+    };
+    let roughness = [(); 2].map(|()| least.powf(pcg.f32()));
+    let [diffuse, reflected] = [(); 2].map(|()| if pcg.below(2) == 0 { 0.0 } else { pcg.f32() });
+    let transmitted = if transmits { 0.1 + pcg.f32() } else { 0.0 };
+    let reflected = if transmits { reflected } else { 0.1 + reflected };
+    let surface = Microfacet::new(normal, outgoing, 0.5)
+        .anisotropic(tangent, roughness)
+        .with_weights(diffuse, reflected, transmitted)
+        .with_ior([1.0, 1.5, 1.0 / 1.5, 2.4][pcg.below(4)]);
+    ShadingPoint::microfacet(x.position, surface)
 }

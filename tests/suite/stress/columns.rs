@@ -1,7 +1,7 @@
 //! The shading points of the matrix: places around one triangle.
 
-use fanlight::{Receiver, ShadingPoint};
-use glam::DVec3;
+use fanlight::{Glossy, Microfacet, Receiver, Scattering, ShadingPoint};
+use glam::{DVec3, Vec3};
 
 use crate::common::scene::Scene;
 
@@ -48,6 +48,35 @@ pub(crate) fn point(scene: &Scene, column: usize, receiver: usize) -> ShadingPoi
     .normalize();
     let receiver = [Receiver::Surface(normal), Receiver::Transmissive(normal), Receiver::Volume][receiver];
     ShadingPoint::new(position.as_vec3(), receiver)
+}
+
+/// The same point with a lobe: of a glossy surface, of microfacets on a transmissive one, or a phase function. `turn` decides
+/// about the roughness, from 1e-4 to 1, and the outgoing direction: grazing, below the horizon, or above.
+pub(crate) fn with_lobe(x: ShadingPoint, turn: usize) -> ShadingPoint {
+    let roughness = [1e-4, 1e-3, 1e-2, 0.1, 1.0][turn % 5];
+    let along = Vec3::new(0.6, -0.3, 0.5);
+    let outgoing = |normal: Vec3| {
+        let across = along.reject_from(normal).normalize();
+        match turn / 5 % 4 {
+            0 => (across + 1e-4 * normal).normalize(),
+            1 => (across - 0.5 * normal).normalize(),
+            _ => (across + normal).normalize(),
+        }
+    };
+    match x.receiver {
+        Receiver::Surface(normal) if turn % 2 == 0 => {
+            ShadingPoint::glossy(x.position, Glossy::new(normal, outgoing(normal), roughness))
+        }
+        Receiver::Surface(normal) => {
+            let brushed = Glossy::new(normal, outgoing(normal), roughness).anisotropic(along, [roughness, 0.3]);
+            ShadingPoint::microfacet(x.position, brushed)
+        }
+        Receiver::Transmissive(normal) => {
+            let glass = Microfacet::new(normal, outgoing(normal), roughness).with_weights(0.0, 0.1, 0.9);
+            ShadingPoint::microfacet(x.position, glass.with_ior([1.0, 1.5, 0.66][turn % 3]))
+        }
+        _ => ShadingPoint::scattering(x.position, Scattering::new(along, [0.99, -0.7, 0.3][turn % 3])),
+    }
 }
 
 /// A normal over whose horizon a tip rises, but not the centre.

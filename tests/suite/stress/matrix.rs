@@ -41,6 +41,10 @@ struct Plan {
     others: Option<Effort>,
     /// One receiver a cell, by turns.
     thin: bool,
+    /// Whether the receivers have lobes.
+    lobes: bool,
+    /// One row of so many.
+    step: usize,
 }
 
 /// All columns of one row.
@@ -66,13 +70,14 @@ fn run(number: usize, plan: &Plan) -> (&'static str, Vec<Cell>) {
         for (column, receiver) in all().collect::<Vec<_>>() {
             let Some(effort) = turn(column, receiver) else { continue };
             let x = row.now(columns::point(&row.scene, column, receiver));
-            let at = lights.at(&x);
+            let guide = if plan.lobes { columns::with_lobe(x, number + 3 * column + receiver) } else { x };
+            let at = lights.at(&guide);
             let seed = (number * cells.len() + column) as u64;
-            let mut found = measure((&row, &lights), &at, &x, effort, seed);
+            let mut found = measure((&row, &lights), &at, [&x, &guide], effort, seed);
             if !found.misses().is_empty() {
                 // More samples and cells tell an error from chance.
                 let more = Effort { points: AGAIN * effort.points, cells: AGAIN * effort.cells, ..effort };
-                found = measure((&row, &lights), &at, &x, more, 1000 + seed);
+                found = measure((&row, &lights), &at, [&x, &guide], more, 1000 + seed);
                 repeated += 1;
             }
             let context = format!("{} {:?} {variant}", describe(&row, column, &x), ARITIES[variant / 2]);
@@ -112,7 +117,7 @@ impl Cell {
 }
 
 fn run_all(plan: &Plan) -> Vec<(&'static str, Vec<Cell>)> {
-    parallel::map(rows::COUNT, |number| run(number, plan))
+    parallel::map(rows::COUNT.div_ceil(plan.step), |number| run(number * plan.step, plan))
 }
 
 fn missed(table: &[(&'static str, Vec<Cell>)]) -> Vec<String> {
@@ -187,7 +192,26 @@ fn print_all(table: &[(&'static str, Vec<Cell>)]) {
 #[test]
 fn a_small_matrix_holds() {
     let whole = Effort { points: 20, samples: 100, directions: 10, cells: 200 };
-    let plan = Plan { sizes: Sizes { triangles: 2000, sky: 64 }, whole, others: None, thin: true };
+    let plan =
+        Plan { sizes: Sizes { triangles: 2000, sky: 64 }, whole, others: None, thin: true, lobes: false, step: 1 };
+    check(&run_all(&plan));
+}
+
+/// Lobes as further receivers, with roughnesses down to mirrors.
+#[test]
+fn a_small_matrix_with_lobes_holds() {
+    let whole = Effort { points: 16, samples: 100, directions: 10, cells: 50 };
+    let plan =
+        Plan { sizes: Sizes { triangles: 2000, sky: 64 }, whole, others: None, thin: true, lobes: true, step: 8 };
+    check(&run_all(&plan));
+}
+
+#[test]
+#[ignore = "release tier: half a minute; cargo test --release --test suite -- --ignored --nocapture table"]
+fn table_with_lobes() {
+    let whole = Effort { points: 128, samples: 500, directions: 50, cells: 300 };
+    let plan =
+        Plan { sizes: Sizes { triangles: 2000, sky: 256 }, whole, others: None, thin: false, lobes: true, step: 2 };
     check(&run_all(&plan));
 }
 
@@ -208,7 +232,8 @@ fn table() {
     let times = std::env::var("STRESS").map_or(1, |times| times.parse().expect("a whole number"));
     let whole = Effort { points: 128 * times, samples: 500, directions: 50, cells: 300 * times };
     let others = Some(Effort { points: 0, samples: 100, directions: 10, cells: 0 });
-    let plan = Plan { sizes: Sizes { triangles: 1_000_000, sky: 4096 }, whole, others, thin: false };
+    let plan =
+        Plan { sizes: Sizes { triangles: 1_000_000, sky: 4096 }, whole, others, thin: false, lobes: false, step: 1 };
     check(&run_all(&plan));
 }
 
@@ -251,7 +276,7 @@ fn a_wrong_density_misses_all_bars() {
     let lights = build(&row.scene, ARITIES[0]);
     let x = columns::point(&row.scene, columns::NAMES.len() - 1, 2);
     let effort = Effort { points: 1024, samples: 300, directions: 100, cells: 300 };
-    assert!(measure((&row, &lights), &lights.at(&x), &x, effort, 1).misses().is_empty());
-    let found = measure((&row, &lights), &Wrong(lights.at(&x)), &x, effort, 1);
+    assert!(measure((&row, &lights), &lights.at(&x), [&x, &x], effort, 1).misses().is_empty());
+    let found = measure((&row, &lights), &Wrong(lights.at(&x)), [&x, &x], effort, 1);
     assert_eq!(found.misses(), ["normalisation", "agreement", "irradiance"], "{found:?}");
 }

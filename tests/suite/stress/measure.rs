@@ -60,11 +60,12 @@ pub(crate) struct Found {
     pub(crate) samples: usize,
 }
 
-/// Everything about one cell. A sample that is no number is a panic.
+/// Everything about one cell. A sample that is no number is a panic. The estimates are those of a host without a lobe at `x`,
+/// which `guide` may have.
 pub(crate) fn measure(
     (row, lights): (&Row, &LightSampler),
     at: &dyn Point,
-    x: &ShadingPoint,
+    [x, guide]: [&ShadingPoint; 2],
     effort: Effort,
     seed: u64,
 ) -> Found {
@@ -90,7 +91,7 @@ pub(crate) fn measure(
     }
     found.dark = exact.arriving == 0.0 && found.none == 1.0;
     let (integral, error) = if is_many(row) {
-        integral::some((row, lights), at, x, &kept, effort.cells)
+        integral::some((row, lights), at, guide, &kept, effort.cells)
     } else {
         integral::all(row, at, x, &kept, effort.cells)
     };

@@ -46,6 +46,34 @@ fn of_intensity(intensity: f64, step: Vec3) -> f64 {
     intensity * f64::from(step.normalize().y / step.length_squared())
 }
 
+/// The sample of the reader, turned to look down, of 100 candelas straight down.
+#[test]
+fn measured_profiles() {
+    let text = include_str!("../../ies/sample.ies");
+    let uri = format!("data:application/x-ies-lm-63,{}", text.replace('%', "%25").replace('\n', "%0A"));
+    let mut file = with_light(&json!({ "type": "point" }));
+    file.json["extensions"] = json!({ "EXT_lights_ies": { "lights": [{ "uri": uri }] } });
+    file.json["nodes"][0]["extensions"] =
+        json!({ "EXT_lights_ies": { "light": 0, "multiplier": 2.0, "color": [1.0, 1.0, 1.0] } });
+    let read = file.read();
+    assert!(read.notes.is_empty(), "{:?}", read.notes);
+    assert!(read.contents.iter().any(|line| line.contains("light profile 0")), "{:?}", read.contents);
+    let table = crate::ies::read(text).expect("a valid file");
+    let profile =
+        fanlight::Profile { vertical: &table.vertical, horizontal: &table.horizontal, intensities: &table.intensities };
+    let intensity = |step: Vec3| {
+        let down = -step.normalize();
+        let angles = [(-down.y).clamp(-1.0, 1.0).acos(), down.z.atan2(down.x)].map(f64::from);
+        2.0 * f64::from(profile.intensity(angles))
+    };
+    assert_near(brightness(&read.model), expected(|step| of_intensity(intensity(step), step)), EXACT);
+    // Type B is refused, by name.
+    let uri = uri.replace("2.0 5 3 1 2", "2.0 5 3 2 2");
+    file.json["extensions"] = json!({ "EXT_lights_ies": { "lights": [{ "uri": uri }] } });
+    let error = file.error();
+    assert!(error.contains("type B") && error.contains("node 0"), "{error}");
+}
+
 #[test]
 fn points() {
     let read = with_light(&json!({ "type": "point", "intensity": 100, "name": "bulb" })).read();
