@@ -175,7 +175,7 @@ pub use record::{
     Wrap,
 };
 pub use sampler::{
-    ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler, RaySegment,
+    ByteSizes, Emission, EmissionSample, LightEdits, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler, RaySegment,
     ResampledLight, SegmentSample, SegmentSampler, VisibilityCounters, VisibilityLearner,
 };
 pub use tlas::{Arity, Splitting};

@@ -48,7 +48,7 @@ pub(crate) struct LightCollection<'a> {
     packed: Vec<u32>,
     /// Light groups of the environment.
     pub(crate) environment_groups: u32,
-    cells: Vec<CellNode>,
+    pub(super) cells: Vec<CellNode>,
     /// Trees over functions by texture and the bits of the three uvs.
     shared: BTreeMap<TreeKey, Root>,
     /// Trees over images that are still to be built, and their numbers.
@@ -233,6 +233,12 @@ impl<'a> LightCollection<'a> {
         }
     }
 
+    /// Returns what is known of the triangles of a mesh: their indices in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
+    pub(super) fn mesh(&self, mesh: u32) -> &[u32] {
+        let [start, end] = [mesh, mesh + 1].map(|mesh| self.meshes[mesh as usize] as usize);
+        &self.indices[start..end]
+    }
+
     /// Returns a light by its index among those that may emit: first the triangles, then the lamps, then the instances.
     pub(crate) fn light(&self, index: u32) -> Light<'_> {
         let index = index as usize;
@@ -324,6 +330,7 @@ impl<'a> LightCollection<'a> {
             has_portals,
             has_lamps: leaves.iter().any(|index| (first_lamp..first_instance).contains(index)),
             is_crossed_once: false,
+            is_edited: false,
             records,
             cells: self.cells,
             leaf_of,

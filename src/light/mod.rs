@@ -8,6 +8,7 @@ mod cell_kernel;
 mod collect;
 mod crossing;
 mod distant;
+mod edit;
 mod emitted;
 mod energy;
 mod extras;
@@ -39,6 +40,7 @@ use crate::warp::Variate;
 
 pub(crate) use collect::LightCollection;
 pub(crate) use distant::{DistantGroup, DistantRecord, MOST_GROUPS};
+pub(crate) use edit::{EditState, Edited, LightChanges, laid_out};
 pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub(crate) use extras::Extras;
@@ -78,6 +80,8 @@ buffers! {
         has_lamps: bool,
         /// Whether a ray is known to meet at most one light that shines back along it.
         is_crossed_once: bool,
+        /// Whether edits may have left places free: then bytes hold another layout.
+        is_edited: bool,
     }
     buffers {
         /// Triangles, and lamps in records of the same size, in the order of the tree's leaves.

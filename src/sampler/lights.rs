@@ -8,11 +8,11 @@ use super::emission::Emission;
 use super::point::PointSampler;
 use crate::env::{Environment, EnvironmentView, RegionMoments};
 use crate::error::Error;
-use crate::light::Lights;
+use crate::light::{EditState, Lights};
 use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
 use crate::technique::{LightScene, Viewpoint};
-use crate::tlas::Tlas;
+use crate::tlas::{Arity, Tlas};
 use crate::visibility::VisibilityView;
 
 /// All lights of a scene, ready to be sampled.
@@ -29,6 +29,12 @@ pub struct LightSampler {
     pub(super) cost: f64,
     /// Cost of the tree as it was built.
     pub(super) cost_at_build: f64,
+    /// Arity of a tree of many lights.
+    pub(super) arity: Arity,
+    /// Words of the objects, where there is no instance of any.
+    pub(super) objects: Vec<u32>,
+    /// What edits need to know, from the first one on.
+    pub(super) edits: Option<Box<EditState>>,
 }
 
 /// All lights of a scene in borrowed memory: plain data that can be mapped from a file or shared between processes.
@@ -155,7 +161,9 @@ impl<'a> LightSamplerView<'a> {
     /// object counts once for each of the object's instances.
     #[must_use]
     pub fn light_count(&self) -> usize {
-        self.scene.lights.count() + self.scene.lights.extras().distants().len()
+        let LightScene { tlas, lights, .. } = &self.scene;
+        let free = if lights.is_edited { tlas.free_leaf_count() } else { 0 };
+        lights.count() - free + lights.extras().distants().len()
     }
 
     /// Returns the number of bytes that the structures take.

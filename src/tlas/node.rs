@@ -216,6 +216,8 @@ pub(crate) struct Slot(u32);
 impl Slot {
     /// Slot of the root, which no lane refers to.
     pub(super) const ROOT: Self = Self(u32::MAX);
+    /// Slot of a place that an edit has left free. No walk gets there, and bytes hold none.
+    pub(super) const FREE: Self = Self(u32::MAX - 1);
 
     pub(super) fn new<const N: usize>(node: usize, lane: usize) -> Self {
         Self((node * N + lane) as u32)
