@@ -40,9 +40,9 @@ pub(crate) struct LightCollection<'a> {
     /// Light groups of each mesh.
     pub(super) mesh_groups: Vec<u32>,
     /// Lights that are not made of triangles.
-    lamps: Vec<LampRecord>,
+    pub(super) lamps: Vec<LampRecord>,
     /// Light groups of each.
-    lamp_groups: Vec<u32>,
+    pub(super) lamp_groups: Vec<u32>,
     profiles: ProfileCollection,
     /// The same as lights need them. Complete after [`Self::build_images`].
     packed: Vec<u32>,

@@ -114,11 +114,6 @@ impl<'a> Extras<'a> {
         if self.is_empty() { ALL_GROUPS } else { self.groups().get(leaf as usize).copied().unwrap_or(ALL_GROUPS) }
     }
 
-    /// Whether some lights are not in all groups.
-    pub(super) fn has_groups(self) -> bool {
-        self.header().groups > 0
-    }
-
     /// Returns the light groups of the environment as a light.
     pub(crate) fn groups_of_environment(self) -> u32 {
         self.groups().last().copied().unwrap_or(ALL_GROUPS)

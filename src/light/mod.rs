@@ -40,7 +40,7 @@ use crate::warp::Variate;
 
 pub(crate) use collect::LightCollection;
 pub(crate) use distant::{DistantGroup, DistantRecord, MOST_GROUPS};
-pub(crate) use edit::{EditState, Edited, LightChanges, laid_out};
+pub(crate) use edit::{EditState, Edited, LightChanges, Unplaced, laid_out};
 pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub(crate) use extras::Extras;

@@ -115,9 +115,9 @@ impl LightSampler {
     /// # Ok::<(), fanlight::Error>(())
     /// ```
     pub fn edit<'a>(&mut self) -> LightEdits<'_, 'a> {
-        let Self { tlas, lights, environment, cost, cost_at_build, arity, objects, edits, .. } = self;
+        let Self { tlas, lights, environment, cost, cost_at_build, arity, unplaced, edits, .. } = self;
         let state =
-            edits.get_or_insert_with(|| EditState::new(lights, tlas, environment, core::mem::take(objects)));
+            edits.get_or_insert_with(|| EditState::new(lights, tlas, environment, core::mem::take(unplaced)));
         let changes = LightChanges::new(state);
         let edited = Edited { lights, tlas, environment, arity: *arity };
         LightEdits { state, edited, costs: [cost, cost_at_build], changes }
@@ -154,8 +154,7 @@ impl<'a> LightEdits<'_, 'a> {
     ///
     /// # Errors
     ///
-    /// If there is no such light, [`Self::add_light`] would refuse the new one, or it emits while the one that the sampler was
-    /// built with emitted nothing, and some lights are not in all light groups: those of such a light are not known.
+    /// If there is no such light, or [`Self::add_light`] would refuse the new one.
     pub fn set_light(&mut self, id: LightId, light: impl Into<Lamp>) -> Result<(), Error> {
         self.changes.set_lamp(self.edited.lights, self.state, id, light.into())
     }

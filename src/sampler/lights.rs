@@ -8,7 +8,7 @@ use super::emission::Emission;
 use super::point::PointSampler;
 use crate::env::{Environment, EnvironmentView, RegionMoments};
 use crate::error::Error;
-use crate::light::{EditState, Lights};
+use crate::light::{EditState, Lights, Unplaced};
 use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
 use crate::technique::{LightScene, Viewpoint};
@@ -31,8 +31,8 @@ pub struct LightSampler {
     pub(super) cost_at_build: f64,
     /// Arity of a tree of many lights.
     pub(super) arity: Arity,
-    /// Words of the objects, where there is no instance of any.
-    pub(super) objects: Vec<u32>,
+    /// What is there for edits alone.
+    pub(super) unplaced: Unplaced,
     /// What edits need to know, from the first one on.
     pub(super) edits: Option<Box<EditState>>,
 }

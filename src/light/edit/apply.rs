@@ -163,22 +163,23 @@ impl Application<'_, '_> {
         let Some(LampChange { record, groups }) = change else {
             self.clear(place);
             self.distants_change |= self.distants.remove(&number).is_some();
-            self.state.dark_lamps.remove(&number);
+            self.state.unplaced.lamps.remove(&number);
             return self.state.lamps.remove(number);
         };
         self.state.lamps.insert(number);
-        let dark = self.state.dark_lamps.remove(&number);
+        let dark = self.state.unplaced.lamps.remove(&number);
         let distant = self.distants.get(&number).map(|light| light.groups);
         let kept = if Self::is_leaf(leaf) { Some(self.tree.store.groups(leaf)) } else { distant.or(dark) };
         let groups = groups.or(kept).unwrap_or(ALL_GROUPS);
         if let Some(light) = record.distant() {
             self.clear(place);
             let light = DistantRecord::new(&light, number, groups);
-            if light.irradiance() > 0.0 || distant.is_some() {
+            self.distants_change |= self.distants.remove(&number).is_some();
+            if light.irradiance() > 0.0 {
                 self.distants.insert(number, light);
                 self.distants_change = true;
             } else {
-                self.state.dark_lamps.insert(number, groups);
+                self.state.unplaced.lamps.insert(number, groups);
             }
             return;
         }
@@ -187,14 +188,15 @@ impl Application<'_, '_> {
         if record.has_extent() {
             self.lights().is_crossed_once = false;
         }
-        if Self::is_leaf(leaf) {
+        if !(self.tree.store.energy(&light.record) > 0.0) {
+            self.clear(place);
+            self.state.unplaced.lamps.insert(number, groups);
+        } else if Self::is_leaf(leaf) {
             self.lights().records[leaf as usize] = light.record;
             self.tree.update(leaf);
-        } else if self.tree.store.energy(&light.record) > 0.0 {
+        } else {
             self.lights().has_lamps = true;
             self.tree.insert(light);
-        } else {
-            self.state.dark_lamps.insert(number, groups);
         }
     }
 
@@ -356,7 +358,7 @@ impl LightsState {
 
     fn instance_words(&self, lights: &Lights, changes: &BTreeMap<u32, Option<InstanceChange>>) -> usize {
         let more = self.instance_count(lights, changes) - records(&lights.instances).len();
-        lights.instances.len() + self.spare_objects.len() + more.saturating_mul(RECORD_WORDS)
+        lights.instances.len() + self.unplaced.objects.len() + more.saturating_mul(RECORD_WORDS)
     }
 
     /// Makes room for the records of all instances.
@@ -367,7 +369,7 @@ impl LightsState {
         }
         if lights.instances.is_empty() {
             lights.instances.push(0);
-            lights.instances.append(&mut self.spare_objects);
+            lights.instances.append(&mut self.unplaced.objects);
         }
         let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3]];
         let object = first_object(count) as u32;

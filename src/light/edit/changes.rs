@@ -131,15 +131,6 @@ impl<'a> LightChanges<'a> {
         self.check_lamp(&state.lights, number)?;
         let record = self.lamp(lights, lamp, number)?;
         let before = self.lamps.get(&number).copied().flatten();
-        let is_new = before.is_some_and(|before| before.groups.is_some());
-        // The light groups of what was dark from the start are not known.
-        let has_groups = lights.view().extras().has_groups();
-        if has_groups && !is_new && number < state.lights.first_edited_lamp && record.weight() > 0.0 {
-            let id = LightId(number);
-            if lights.view().leaf_of_lamp(id).is_none() && lights.view().extras().distant_of(id).is_none() {
-                return Err(Error(ErrorKind::RevivedLight { light: number as usize }));
-            }
-        }
         self.lamps.insert(number, Some(LampChange { record, groups: before.and_then(|before| before.groups) }));
         Ok(())
     }
@@ -306,7 +297,7 @@ impl LightsState {
     fn object<'o>(&'o self, lights: &'o Lights, number: u32) -> Option<(Object<'o>, u32)> {
         let start = *self.objects.get(number as usize)?;
         if lights.instances.is_empty() {
-            return Some((Object::at(&self.spare_objects, start), start));
+            return Some((Object::at(&self.unplaced.objects, start), start));
         }
         let first = first_object(records(&lights.instances).len()) as u32;
         Some((Object::at(&lights.instances, first + start), start))

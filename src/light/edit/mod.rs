@@ -19,10 +19,11 @@ use alloc::vec::Vec;
 
 use super::extras;
 use super::instance::{object_starts, records, records_mut};
-use super::{Energies, Extras, Light, LightTriangle, Lights};
+use super::{Energies, Extras, Light, LightCollection, LightTriangle, Lights};
 use crate::blas::CellNode;
 use crate::bounds::{LightBounds, Moments};
 use crate::env::Environment;
+use crate::receiver::ALL_GROUPS;
 use crate::tlas::{LeafStore, Tlas, TreeEdit, TreeState};
 pub(crate) use apply::Edited;
 pub(crate) use changes::LightChanges;
@@ -46,6 +47,26 @@ pub(crate) struct EditState {
     total: f64,
 }
 
+/// What a sampler holds only for edits to come.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Unplaced {
+    /// Words of the objects while there is no instance.
+    objects: Vec<u32>,
+    /// Light groups of lamps that emit nothing, but for those in all groups.
+    lamps: BTreeMap<u32, u32>,
+}
+
+impl Unplaced {
+    /// Takes from a collection what will not be in its sampler.
+    pub(crate) fn of(collection: &mut LightCollection<'_>) -> Self {
+        let has_instances = !collection.instances.is_empty();
+        let objects = if has_instances { Vec::new() } else { core::mem::take(&mut collection.object_words) };
+        let lamps = (0..).zip(collection.lamps.iter().zip(&collection.lamp_groups));
+        let dark = lamps.filter(|(_, (lamp, groups))| lamp.weight() == 0.0 && **groups != ALL_GROUPS);
+        Self { objects, lamps: dark.map(|(number, (_, groups))| (number, *groups)).collect() }
+    }
+}
+
 /// What edits of lights need to know beside them.
 #[derive(Clone, Debug)]
 struct LightsState {
@@ -56,14 +77,9 @@ struct LightsState {
     free_meshes: BTreeMap<u32, Vec<u32>>,
     /// Numbers of triangles of those meshes that have more places than triangles.
     mesh_sizes: BTreeMap<u32, u32>,
-    /// Light groups of lamps that emitted nothing when they were added.
-    dark_lamps: BTreeMap<u32, u32>,
-    /// Number of the first lamp that was added by an edit.
-    first_edited_lamp: u32,
     /// First word of every object, after those of all instances.
     objects: Vec<u32>,
-    /// Words of the objects while there is no instance.
-    spare_objects: Vec<u32>,
+    unplaced: Unplaced,
     /// Nodes of trees over textures when those that nothing refers to were removed last.
     cells: usize,
 }
@@ -74,7 +90,7 @@ impl EditState {
         lights: &mut Lights,
         tlas: &mut Tlas,
         environment: &Environment,
-        spare_objects: Vec<u32>,
+        unplaced: Unplaced,
     ) -> Box<Self> {
         let lamp_start = lights.meshes.last().copied().unwrap_or(0);
         let lamps = lights.leaf_of.len() as u32 - lamp_start;
@@ -84,10 +100,8 @@ impl EditState {
             instances: Numbers::new(records(&lights.instances).len() as u32),
             free_meshes: BTreeMap::new(),
             mesh_sizes: BTreeMap::new(),
-            dark_lamps: BTreeMap::new(),
-            first_edited_lamp: lamps,
-            objects: object_starts(&lights.instances, &spare_objects),
-            spare_objects,
+            objects: object_starts(&lights.instances, &unplaced.objects),
+            unplaced,
             cells: lights.cells.len(),
         };
         // The spare places: none yet.

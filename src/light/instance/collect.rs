@@ -142,11 +142,6 @@ impl<'a> LightCollection<'a> {
         }
     }
 
-    /// Takes the words of the objects if there is no instance, so that edits may add some.
-    pub(crate) fn take_objects_alone(&mut self) -> Vec<u32> {
-        if self.instances.is_empty() { core::mem::take(&mut self.object_words) } else { Vec::new() }
-    }
-
     /// Number of the triangles of all objects that may emit.
     pub(crate) fn object_light_count(&self) -> usize {
         self.objects.iter().map(|object| object.triangles.len()).sum()
