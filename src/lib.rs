@@ -175,8 +175,8 @@ pub use record::{
     Wrap,
 };
 pub use sampler::{
-    ByteSizes, Emission, EmissionSample, LightEdits, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler, RaySegment,
-    ResampledLight, SegmentSample, SegmentSampler, VisibilityCounters, VisibilityLearner,
+    ByteSizes, Emission, EmissionSample, LightEdits, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
+    RaySegment, ResampledLight, SegmentSample, SegmentSampler, VisibilityCounters, VisibilityLearner,
 };
 pub use tlas::{Arity, Splitting};
 pub use visibility::{Visibility, VisibilityView};

@@ -116,8 +116,7 @@ impl LightSampler {
     /// ```
     pub fn edit<'a>(&mut self) -> LightEdits<'_, 'a> {
         let Self { tlas, lights, environment, cost, cost_at_build, arity, unplaced, edits, .. } = self;
-        let state =
-            edits.get_or_insert_with(|| EditState::new(lights, tlas, environment, core::mem::take(unplaced)));
+        let state = edits.get_or_insert_with(|| EditState::new(lights, tlas, environment, core::mem::take(unplaced)));
         let changes = LightChanges::new(state);
         let edited = Edited { lights, tlas, environment, arity: *arity };
         LightEdits { state, edited, costs: [cost, cost_at_build], changes }

@@ -9,6 +9,7 @@ use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Scene, random_point};
+use crate::edits::edited;
 use crate::groups::scene as grouped;
 use crate::instances;
 use crate::instances::town::Town;
@@ -33,6 +34,10 @@ const LAST_KIND: usize = SCENES + KINDS;
 const LAST_GROUPS: usize = LAST_KIND + GROUPS;
 /// End of the scenes with learned visibility.
 const LAST_LEARNED: usize = LAST_GROUPS + LEARNED;
+/// End of the scenes of instances.
+const LAST_TOWN: usize = LAST_LEARNED + TOWNS;
+/// Scenes that are edited.
+const EDITED: usize = 12;
 
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// The same scenes at points with lobes.
@@ -217,6 +222,33 @@ fn line_of_town(number: usize) -> String {
     format!("{number:2} instances {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene that is edited.
+fn line_of_edited(number: usize) -> String {
+    let (_, lights) = edited(number as u64, number, 30);
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let splitting = Splitting::new(0.7, 2);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    let emission = lights.emission();
+    hash.add(&[lights.decay()]);
+    for i in 0..POINTS {
+        let x = random_point(&mut pcg, i);
+        let at = lights.at(&x);
+        let u = pcg.cube();
+        for sample in at.sample(u).iter().chain(sample_split(&at, u, &splitting).iter().take(8)) {
+            drawn += 1;
+            let id = sample.light.id().map_or(u32::MAX, |id| id.index());
+            hash.add(&[f32::from_bits(id), sample.distance, sample.pdf, sample.pdf_area, sample.pmf]);
+            [sample.position, sample.normal, sample.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
+        }
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            [ray.position, ray.normal, ray.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[ray.pdf, ray.pmf, emission.pdf_ray(x.position, pcg.direction())]);
+        }
+    }
+    format!("{number:2} edited {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -229,13 +261,14 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED + TOWNS };
+    let more = if has_lobes { 0 } else { KINDS + GROUPS + LEARNED + TOWNS + EDITED };
     let line = |i| match i {
         0..SCENES => line(i, has_lobes),
         SCENES..LAST_KIND => line_of_kinds(i - SCENES),
         LAST_KIND..LAST_GROUPS => line_of_groups(i - LAST_KIND),
         LAST_GROUPS..LAST_LEARNED => line_of_learned(i - LAST_GROUPS),
-        _ => line_of_town(i - LAST_LEARNED),
+        LAST_LEARNED..LAST_TOWN => line_of_town(i - LAST_LEARNED),
+        _ => line_of_edited(i - LAST_TOWN),
     };
     let found = parallel::map(SCENES + more, line).concat();
     if std::env::var("GOLDEN").is_ok_and(|value| value == "write") {

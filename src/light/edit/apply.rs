@@ -234,14 +234,7 @@ impl Application<'_, '_> {
         }
     }
 
-    fn add_mesh(
-        &mut self,
-        number: u32,
-        triangles: &[u32],
-        groups: u32,
-        collection: &LightCollection<'_>,
-        base: u32,
-    ) {
+    fn add_mesh(&mut self, number: u32, triangles: &[u32], groups: u32, collection: &LightCollection<'_>, base: u32) {
         self.lights().is_crossed_once = false;
         if !self.lights().scales.is_empty() {
             self.set_scale(number, 1.0);
@@ -425,8 +418,5 @@ impl LightsState {
 }
 
 /// What becomes of lamps, meshes and instances.
-type Changes<'c> = (
-    &'c BTreeMap<u32, Option<LampChange>>,
-    &'c BTreeMap<u32, MeshChange>,
-    &'c BTreeMap<u32, Option<InstanceChange>>,
-);
+type Changes<'c> =
+    (&'c BTreeMap<u32, Option<LampChange>>, &'c BTreeMap<u32, MeshChange>, &'c BTreeMap<u32, Option<InstanceChange>>);

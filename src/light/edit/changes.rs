@@ -265,11 +265,7 @@ impl<'a> LightChanges<'a> {
     }
 
     /// Removes an instance.
-    pub(crate) fn remove_instance(
-        &mut self,
-        state: &EditState,
-        InstanceId(number): InstanceId,
-    ) -> Result<(), Error> {
+    pub(crate) fn remove_instance(&mut self, state: &EditState, InstanceId(number): InstanceId) -> Result<(), Error> {
         self.check_instance(&state.lights, number)?;
         self.instances.insert(number, None);
         Ok(())

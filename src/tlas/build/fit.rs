@@ -61,6 +61,9 @@ impl Tlas {
 impl<const N: usize> Node<N> {
     /// Writes what is known of all children, in the order of the lanes. Returns what is known of the node.
     pub(in crate::tlas) fn fit(&mut self, lanes: &[Fitted]) -> (Fitted, Spread) {
+        if lanes.is_empty() {
+            return (Fitted::NONE, Spread::default());
+        }
         let known: SmallVec<[_; MAX_LANES]> = lanes.iter().map(|lane| (lane.bounds, lane.moments)).collect();
         self.set(&known);
         let whole = lanes.iter().copied().reduce(|whole, lane| whole.union(&lane)).unwrap_or(Fitted::NONE);
@@ -157,8 +160,8 @@ impl Fitted {
     }
 
     fn spread(&self) -> Spread {
-        let mean = self.sum / self.count.max(1.0);
-        let variance = (self.squares / self.count.max(1.0) - mean * mean).max(0.0);
+        let mean = self.sum / self.count;
+        let variance = (self.squares / self.count - mean * mean).max(0.0);
         Spread { count: self.count as f32, mean: mean as f32, variance: variance as f32 }
     }
 }

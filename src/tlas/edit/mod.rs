@@ -17,6 +17,8 @@ mod blocks;
 mod place;
 mod rebuild;
 mod relayout;
+#[cfg(test)]
+mod tests;
 
 use alloc::vec::Vec;
 

@@ -40,9 +40,15 @@ impl<S: LeafStore> TreeEdit<'_, S> {
         };
         self.store.resize(order.len());
         (0..).zip(order).for_each(|(leaf, i)| self.store.put(leaf, lights[i as usize]));
+        let has_groups = !self.tlas.groups.is_empty();
         *self.tlas = tlas;
         *self.state = TreeState::default();
         self.prepare();
+        // A tree of one leaf or none has been given its root here.
+        if has_groups && self.tlas.groups.is_empty() {
+            self.tlas.groups.resize(self.tlas.arity.lanes(), 0);
+            self.fit_all();
+        }
     }
 }
 

@@ -87,7 +87,11 @@ impl Patch {
     /// Passes the mesh on. `scale` multiplies a constant weight, as it cannot one of a texture.
     fn with<R>(&self, texture: TextureId, then: impl FnOnce(&Mesh<'_>) -> R) -> R {
         let indices = self.indices();
-        let mesh = if self.is_portal { Mesh::portal(&self.positions, &indices) } else { Mesh::emitter(&self.positions, &indices) };
+        let mesh = if self.is_portal {
+            Mesh::portal(&self.positions, &indices)
+        } else {
+            Mesh::emitter(&self.positions, &indices)
+        };
         let weight = if self.is_textured { Weight::Texture(texture) } else { Weight::Constant(self.weight) };
         then(&mesh.weight(weight).uvs(&self.uvs).sides(Sides::Two).groups(self.groups))
     }
@@ -162,7 +166,8 @@ impl World {
     fn instance(&self, pcg: &mut Pcg32, groups: u32) -> Instance {
         let scale = Vec3::new(pcg.within(0.2, 1.0), pcg.within(0.2, 1.0), pcg.within(-1.0, -0.2));
         let rotation = Quat::from_rotation_arc(pcg.direction(), pcg.direction());
-        let place = Affine3A::from_scale_rotation_translation(scale, rotation, 4.0 * Vec3::from_array(pcg.cube()) - 2.0);
+        let place =
+            Affine3A::from_scale_rotation_translation(scale, rotation, 4.0 * Vec3::from_array(pcg.cube()) - 2.0);
         let factor = if pcg.below(6) == 0 { 0.0 } else { pcg.within(0.5, 2.0) };
         Instance::new(ObjectId::from_index(pcg.below(2) as u32), place).scaled(factor).groups(groups)
     }
@@ -216,9 +221,10 @@ impl World {
         let triangles = self.patches.iter().flat_map(|(&id, patch)| {
             (0..patch.indices().len() as u32).map(move |i| Id::Triangle(TriangleId::new(id, i)))
         });
-        let placed = self.instances.keys().flat_map(|&id| {
-            (0..2).map(move |i| Id::Placed(id, TriangleId::new(MeshId::from_index(0), i)))
-        });
+        let placed = self
+            .instances
+            .keys()
+            .flat_map(|&id| (0..2).map(move |i| Id::Placed(id, TriangleId::new(MeshId::from_index(0), i))));
         lamps.chain(triangles).chain(placed)
     }
 
@@ -312,6 +318,23 @@ impl World {
                 self.instances.remove(&id);
             }
             _ => {}
+        }
+        Ok(())
+    }
+
+    /// Removes what there is of each kind beyond a number.
+    pub(crate) fn shrink_to(&mut self, edits: &mut LightEdits<'_, 'static>, count: usize) -> Result<(), Error> {
+        for id in self.lamps.keys().copied().skip(count).collect::<Vec<_>>() {
+            edits.remove_light(id)?;
+            self.lamps.remove(&id);
+        }
+        for id in self.patches.keys().copied().skip(count).collect::<Vec<_>>() {
+            edits.remove_mesh(id)?;
+            self.patches.remove(&id);
+        }
+        for id in self.instances.keys().copied().skip(count).collect::<Vec<_>>() {
+            edits.remove_instance(id)?;
+            self.instances.remove(&id);
         }
         Ok(())
     }
