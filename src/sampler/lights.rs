@@ -49,7 +49,7 @@ pub struct LightSamplerView<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ByteSizes {
-    /// Tree over the lights.
+    /// Tree over the lights, and what edits need beside it.
     pub light_tree: usize,
     /// The lights themselves, and the ways from ids to lights; objects, with their own light trees, and instances.
     pub lights: usize,
@@ -134,7 +134,9 @@ impl LightSampler {
     /// Returns the number of bytes that the structures take.
     #[must_use]
     pub fn bytes(&self) -> ByteSizes {
-        self.as_view().bytes()
+        let mut bytes = self.as_view().bytes();
+        bytes.light_tree += self.edits.as_ref().map_or(0, |edits| edits.byte_size());
+        bytes
     }
 
     /// Returns everything as bytes: see [`LightSamplerView::to_bytes`].

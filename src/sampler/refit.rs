@@ -85,7 +85,8 @@ impl LightSampler {
     /// Returns the cost of the tree in relation to its cost when it was built, by the surface area orientation heuristic.
     ///
     /// The result is 1 after the build, and after a motion of everything as a whole. At 1.5 samples are noisier by about a
-    /// third than those of a new build, at 2 by about a factor of two: rebuild somewhere in between.
+    /// third than those of a new build, at 2 by about a factor of two: rebuild somewhere in between. [Edits](Self::edit) build
+    /// parts of the tree again by themselves; when they have built all of it, the result is 1 again.
     #[must_use]
     pub fn decay(&self) -> f32 {
         (self.cost / self.cost_at_build) as f32

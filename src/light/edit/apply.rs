@@ -122,6 +122,9 @@ impl EditState {
             edit.fit_all();
         }
         let cost = edit.cost();
+        if is_rebuilt {
+            lights.find_crossings();
+        }
         lights.energy = if *total > 0.0 { storable(*unit) } else { 0.0 };
         if lights.cells.len() > 2 * state.cells + FEW_CELLS {
             lights.reclaim_cells();

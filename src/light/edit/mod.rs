@@ -85,6 +85,11 @@ struct LightsState {
 }
 
 impl EditState {
+    /// Returns the number of bytes that this takes, but for what was removed or is dark.
+    pub(crate) fn byte_size(&self) -> usize {
+        self.tree.byte_size() + size_of_val(&self.lights.objects[..]) + size_of_val(&self.lights.unplaced.objects[..])
+    }
+
     /// Prepares a sampler that has not been edited before.
     pub(crate) fn new(
         lights: &mut Lights,

@@ -9,8 +9,8 @@
 //! that fits a built tree. So an edited tree says what a fresh fit of the same shape would say, however many edits there
 //! have been. Only nodes above an edit are fitted again, once for a whole batch.
 //!
-//! The shape gets worse with every leaf that comes or goes. A subtree in which there were as many such edits as it has leaves is
-//! built again ([`rebuild`]), as in a scapegoat tree (Galperin and Rivest 1993), which costs each edit a constant share of a
+//! The shape gets worse with every leaf that comes or goes. A subtree in which there were half as many such edits as it has
+//! leaves is built again ([`rebuild`]), as in a scapegoat tree (Galperin and Rivest 1993), which costs each edit a constant share of a
 //! build at each level of the tree.
 
 mod blocks;
@@ -35,13 +35,20 @@ pub(crate) use relayout::relayout;
 /// Edits of a subtree's shape, relative to its number of leaves, after which it is built again. *Measured* on edited clouds
 /// (docs/ACCURACY.md, "Edits").
 ///
-/// Larger: choices get noisier between builds. Smaller: edits take longer.
-const REBUILT_SHARE: f32 = 1.0;
+/// Larger: choices get noisier between builds. Smaller: edits take longer. It must be below 1 (*proved*): a subtree of new leaves
+/// alone has more leaves than edits, and would never be built again, however deep it is.
+const REBUILT_SHARE: f32 = 0.5;
 
 /// Fewest edits after which a subtree is built again. *Chosen*: two nodes of leaves.
 ///
 /// Larger: small subtrees get worse. Smaller: small subtrees are built for a handful of edits.
 const LEAST_EDITS: u32 = 32;
+
+/// Depth from which on a new leaf looks for a subtree above it that is to be built again, without waiting for the end of the
+/// batch. *Chosen*: more than twice the depth of a built tree of a million lights.
+///
+/// Larger: long batches of lights at one place take longer. Smaller: deep trees are searched in vain.
+const DEEP: usize = 32;
 
 /// Free places, relative to those in use, above which a tree is laid out anew. *Chosen* as a bound of the memory.
 ///
@@ -84,6 +91,11 @@ pub(crate) struct TreeState {
 }
 
 impl TreeState {
+    /// Returns the number of bytes that this takes.
+    pub(crate) fn byte_size(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of::<u32>() * (self.free_nodes.count() + self.free_leaves.count())
+    }
+
     /// Returns the number of leaves that are free.
     pub(crate) fn free_leaf_count(&self) -> usize {
         self.free_leaves.count()
@@ -160,7 +172,18 @@ impl<S: LeafStore> TreeEdit<'_, S> {
 
     /// Puts a light in a new leaf.
     pub(crate) fn insert(&mut self, light: S::Leaf) {
-        in_arity!(self, wide => wide.insert(light));
+        // Where all will be built again at the end of the batch, any place will do.
+        if self.is_worn() {
+            self.state.nodes[0].edits += 1;
+            in_arity!(self, wide => wide.add_loose(light));
+        } else {
+            in_arity!(self, wide => wide.insert(light));
+        }
+    }
+
+    /// Whether there were so many edits that all of the tree is to be built again. In a batch, it stays so.
+    fn is_worn(&self) -> bool {
+        self.state.nodes[0].edits > most_edits(self.leaf_count() as f32)
     }
 
     /// Removes a leaf. Returns the light that was in it.
@@ -176,8 +199,7 @@ impl<S: LeafStore> TreeEdit<'_, S> {
     /// Ends a batch: fits what has changed, and builds again what has changed too much. `arity` is that of large trees. Returns
     /// whether all was built again.
     pub(crate) fn finish(&mut self, arity: Arity) -> bool {
-        let (edits, count) = (self.state.nodes[0].edits, self.leaf_count());
-        if edits > most_edits(count as f32) || (self.tlas.arity != arity && count > self.tlas.arity.lanes()) {
+        if self.is_worn() || (self.tlas.arity != arity && self.leaf_count() > self.tlas.arity.lanes()) {
             self.rebuild(arity);
             return true;
         }
@@ -294,6 +316,7 @@ impl<const N: usize, S: LeafStore> WideEdit<'_, N, S> {
     }
 
     /// Gives a node the bounds of its children.
+    #[inline(never)]
     fn fit(&mut self, index: usize) {
         let [first_node, nodes, first_leaf, leaves] = self.children(index);
         let mut lanes = SmallVec::<[Fitted; MAX_LANES]>::new();

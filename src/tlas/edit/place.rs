@@ -1,6 +1,6 @@
 //! Where a leaf goes, and what happens to the nodes around it.
 
-use super::{LeafStore, NodeState, WideEdit};
+use super::{DEEP, LeafStore, NodeState, WideEdit, most_edits};
 use crate::bounds::{LightBounds, orientation_measure};
 use crate::geometry::{Aabb, angle};
 use crate::math;
@@ -54,7 +54,7 @@ impl<const N: usize, S: LeafStore> WideEdit<'_, N, S> {
         let fitted = Fitted::leaf(self.store.bounds(&light));
         let all = self.state.nodes[0].fitted.bounds.union(fitted.bounds).aabb;
         let growth = Growth { new: &fitted.bounds, pad: PAD * all.extent().max_element() };
-        let mut index = 0;
+        let (mut index, mut depth) = (0, 0);
         loop {
             let state = &mut self.state.nodes[index];
             // As later lights of the batch should see it.
@@ -68,10 +68,35 @@ impl<const N: usize, S: LeafStore> WideEdit<'_, N, S> {
                 return;
             }
             match self.best_child(index, &growth) {
-                Child::Node(child) => index = child as usize,
-                Child::Leaf(leaf) => return self.pair(index, leaf as usize, light),
+                Child::Node(child) => (index, depth) = (child as usize, depth + 1),
+                Child::Leaf(leaf) => {
+                    self.pair(index, leaf as usize, light);
+                    break;
+                }
                 Child::Empty => return,
             }
+        }
+        if depth >= DEEP {
+            self.rebuild_above(index);
+        }
+    }
+
+    /// Puts a light into a leaf that no node knows of.
+    pub(super) fn add_loose(&mut self, light: S::Leaf) {
+        let leaf = self.allocate_leaves(1);
+        self.store.put(leaf as u32, light);
+        self.tlas.leaves[leaf] = Slot::ROOT;
+    }
+
+    /// Builds the largest subtree again that holds a node and has changed too much, if there is one.
+    fn rebuild_above(&mut self, index: usize) {
+        let above = core::iter::successors(Some(index), |&index| Some(self.tlas.parents[index].get::<N>()?.0));
+        let is_worn = |&index: &usize| {
+            let state = &self.state.nodes[index];
+            state.edits > most_edits(state.fitted.leaf_count())
+        };
+        if let Some(worn) = above.filter(is_worn).last() {
+            self.rebuild_below(worn);
         }
     }
 
@@ -153,7 +178,11 @@ impl<const N: usize, S: LeafStore> WideEdit<'_, N, S> {
 
     /// Removes a leaf. Returns the light that was in it.
     pub(super) fn remove(&mut self, leaf: u32) -> S::Leaf {
-        let (index, _) = self.tlas.leaves[leaf as usize].get::<N>().unwrap_or_default();
+        let Some((index, _)) = self.tlas.leaves[leaf as usize].get::<N>() else {
+            self.tlas.leaves[leaf as usize] = Slot::FREE;
+            self.state.free_leaves.add(leaf as usize, 1);
+            return self.store.take(leaf);
+        };
         self.mark(index, 1);
         let light = self.take_leaf(index, leaf as usize);
         self.tidy(index);
@@ -206,7 +235,7 @@ impl<const N: usize, S: LeafStore> WideEdit<'_, N, S> {
 
     /// Notes that the light in a leaf has changed.
     pub(super) fn update(&mut self, leaf: u32) {
-        let (index, _) = self.tlas.leaves[leaf as usize].get::<N>().unwrap_or_default();
+        let Some((index, _)) = self.tlas.leaves[leaf as usize].get::<N>() else { return };
         let light = self.store.get(leaf);
         let bounds = self.store.bounds(&light).0;
         let stays = index == 0 || holds(&self.state.nodes[index].fitted.bounds, &bounds);

@@ -38,6 +38,9 @@ impl<S: LeafStore> TreeEdit<'_, S> {
         let Ok((tlas, order)) = build_in_groups(arity, lights.len(), &light, &groups, &Progress::new(None, 1.0)) else {
             return;
         };
+        for leaf in leaves {
+            self.store.take(leaf);
+        }
         self.store.resize(order.len());
         (0..).zip(order).for_each(|(leaf, i)| self.store.put(leaf, lights[i as usize]));
         let has_groups = !self.tlas.groups.is_empty();

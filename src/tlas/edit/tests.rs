@@ -136,16 +136,18 @@ fn an_edited_tree_is_the_fit_of_its_shape() {
     }
 }
 
-#[test]
-fn lights_at_one_place_make_no_deep_tree() {
+/// Adds equal lights, in batches of so many, and checks the tree.
+fn add_equal(batch: u32) {
     let (mut tlas, mut state, mut store) = (Tlas::empty(Arity::Four), TreeState::default(), Store::default());
     let mut pcg = Pcg32::new(9, 73);
     let same = light(&mut pcg);
     TreeEdit { tlas: &mut tlas, state: &mut state, store: &mut store }.prepare();
-    for number in 0..3000 {
+    for first in (0..3000).step_by(batch as usize) {
         let mut edit = TreeEdit { tlas: &mut tlas, state: &mut state, store: &mut store };
-        edit.store.lights.insert(number, same);
-        edit.insert(number);
+        for number in first..first + batch {
+            edit.store.lights.insert(number, same);
+            edit.insert(number);
+        }
         edit.finish(Arity::Four);
     }
     check(&tlas, &state, &store);
@@ -153,4 +155,9 @@ fn lights_at_one_place_make_no_deep_tree() {
     let deepest = (0..tlas.leaves.len()).filter(|&leaf| tlas.leaves[leaf] != Slot::FREE);
     let deepest = deepest.map(|leaf| tree.path(leaf as u32).count()).max();
     assert!(deepest <= Some(40), "{deepest:?}");
+}
+
+#[test]
+fn lights_at_one_place_make_no_deep_tree() {
+    [1, 300, 1000].map(add_equal);
 }
