@@ -1,6 +1,6 @@
 //! An edited tree is the fit of its own shape, and refers to every leaf once.
 
-use std::collections::BTreeMap;
+use alloc::collections::BTreeMap;
 
 use super::*;
 use crate::geometry::{Aabb, Cone};
@@ -159,5 +159,5 @@ fn add_equal(batch: u32) {
 
 #[test]
 fn lights_at_one_place_make_no_deep_tree() {
-    [1, 300, 1000].map(add_equal);
+    [1, 300, 1000].into_iter().for_each(add_equal);
 }

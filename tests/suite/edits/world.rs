@@ -1,6 +1,8 @@
 //! Lights of all kinds as plain descriptions that are edited beside a sampler.
 
-use std::collections::BTreeMap;
+extern crate alloc;
+
+use alloc::collections::BTreeMap;
 
 use crate::common::lights::ARITIES;
 use crate::common::pcg::Pcg32;
