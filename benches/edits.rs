@@ -172,7 +172,8 @@ fn row(count: usize) {
             let own: Vec<u32> = (0..).zip(&cloud.0).filter_map(|(id, light)| light.map(|_| id)).collect();
             let new: Vec<u32> = (0..own.len() as u32).collect();
             let [edited, built] = [(&lights, &own), (&fresh, &new)].map(|(lights, ids)| cloud.variances(lights, ids));
-            // The mean over points of the logarithm, as variances of points differ by orders of magnitude.
+            // The mean over points of the logarithm, as variances of points differ by orders of magnitude. Where nothing arrives
+            // there is none.
             let mean =
                 edited.iter().zip(&built).map(|(edited, built)| (edited / built).ln()).sum::<f64>() / POINTS as f64;
             let [edited, built] = [edited, built].map(median);
