@@ -174,8 +174,9 @@ fn row(count: usize) {
             let [edited, built] = [(&lights, &own), (&fresh, &new)].map(|(lights, ids)| cloud.variances(lights, ids));
             // The mean over points of the logarithm, as variances of points differ by orders of magnitude. Where nothing arrives
             // there is none.
-            let mean =
-                edited.iter().zip(&built).map(|(edited, built)| (edited / built).ln()).sum::<f64>() / POINTS as f64;
+            let logarithms = edited.iter().zip(&built).map(|(edited, built)| (edited / built).ln());
+            let known: Vec<f64> = logarithms.filter(|ratio| ratio.is_finite()).collect();
+            let mean = known.iter().sum::<f64>() / known.len() as f64;
             let [edited, built] = [edited, built].map(median);
             println!(
                 "  frame {frame}: exact-sel {edited:.3}, of a fresh build {built:.3}: ratio {:.3}, mean ratio of points {:.3}; \
