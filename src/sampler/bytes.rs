@@ -46,7 +46,8 @@ const REGIONS: ([u8; 4], u32) = (*b"EREG", 1);
 
 impl<'a> LightSamplerView<'a> {
     /// Returns everything as bytes, to be written to disk, mapped, shared or uploaded, and to be read by
-    /// [`Self::from_bytes`] on a machine of the same byte order.
+    /// [`Self::from_bytes`] on a machine of the same byte order. Of an [edited](crate::LightSampler::edit) sampler, the bytes hold no
+    /// free places, and give the same samples.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         if self.scene.lights.is_edited {
