@@ -94,8 +94,8 @@
 //! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
-//! - updates of a built sampler, except that the environment can be rotated, and that lights can move and change their
-//!   brightness ([`refit`](LightSampler::refit)).
+//! - another environment, other objects and other profiles in a built sampler. The environment can be rotated; lights, meshes and
+//!   instances can be added, removed and changed ([`edit`](LightSampler::edit), [`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
 //!
 //! # Units and measures
@@ -178,8 +178,8 @@ pub use record::{
     Wrap,
 };
 pub use sampler::{
-    ByteSizes, Emission, EmissionSample, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler, RaySegment,
-    ResampledLight, SegmentSample, SegmentSampler, VisibilityCounters, VisibilityLearner,
+    ByteSizes, Emission, EmissionSample, LightEdits, LightSampler, LightSamplerBuilder, LightSamplerView, PointSampler,
+    RaySegment, ResampledLight, SegmentSample, SegmentSampler, VisibilityCounters, VisibilityLearner,
 };
 pub use tlas::{Arity, Splitting};
 pub use visibility::{Visibility, VisibilityView};

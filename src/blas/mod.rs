@@ -19,7 +19,7 @@ pub(crate) use build::{ImageTree, RegisteredFunction, build_images, build_proced
 pub use build::{Procedural, Texture};
 #[cfg(test)]
 pub(crate) use build::{TexturePyramid, build};
-pub(crate) use node::{CellNode, LEAF, MAX_AVERAGE, Root, averages, below, holds, mean, storable};
+pub(crate) use node::{CellNode, LEAF, MAX_AVERAGE, Root, averages, below, holds, mean, places, storable};
 pub(crate) use validate::{validate, validate_roots};
 pub(crate) use walk::{
     CHILD_CENTERS, CellTarget, Draw, Follow, Guide, child_corners, child_values, descend, descend_below,

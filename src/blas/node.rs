@@ -47,6 +47,20 @@ impl CellNode {
         bytes.last_chunk().expect("a node is longer than its codes")
     }
 
+    /// Returns the node of a tree that is moved to so many places later in the pool.
+    pub(crate) fn moved_by(mut self, places: u32) -> Self {
+        self.0[2] = self.0[2].wrapping_add(places);
+        self
+    }
+
+    /// Returns the number after that of the last node below the cells, or zero.
+    fn end_below(&self) -> u32 {
+        match self.divided().count_ones() {
+            0 => 0,
+            count => self.0[2].wrapping_add(count),
+        }
+    }
+
     /// Which cells have a node below.
     #[inline(always)]
     pub(crate) fn divided(&self) -> u64 {
@@ -132,4 +146,14 @@ pub(crate) fn end(nodes: &[CellNode], count: usize) -> usize {
 /// Whether the tree of a root, if there is one, starts in this part of a pool.
 pub(crate) fn holds(nodes: &[CellNode], root: Root) -> bool {
     root.node == LEAF || (root.node as usize) < nodes.len()
+}
+
+/// Returns the places in the pool of the nodes of the tree with this first node. They are neighbors.
+pub(crate) fn places(nodes: &[CellNode], first: u32) -> core::ops::Range<usize> {
+    let (mut node, mut end) = (first, first + 1);
+    while node < end {
+        end = end.max(nodes[node as usize].end_below());
+        node += 1;
+    }
+    first as usize..end as usize
 }

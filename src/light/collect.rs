@@ -42,15 +42,15 @@ pub(crate) struct LightCollection<'a> {
     /// Light groups of each mesh.
     pub(super) mesh_groups: Vec<u32>,
     /// Lights that are not made of triangles.
-    lamps: Vec<LampRecord>,
+    pub(super) lamps: Vec<LampRecord>,
     /// Light groups of each.
-    lamp_groups: Vec<u32>,
+    pub(super) lamp_groups: Vec<u32>,
     profiles: ProfileCollection,
     /// The same as lights need them. Complete after [`Self::build_images`].
     packed: Vec<u32>,
     /// Light groups of the environment.
     pub(crate) environment_groups: u32,
-    cells: Vec<CellNode>,
+    pub(super) cells: Vec<CellNode>,
     /// Trees over functions by texture and the bits of the three uvs.
     shared: BTreeMap<TreeKey, Root>,
     /// Trees over images that are still to be built, and their numbers.
@@ -246,6 +246,12 @@ impl<'a> LightCollection<'a> {
         }
     }
 
+    /// Returns what is known of the triangles of a mesh: their indices in `triangles`, [`NO_LEAF`] or [`NO_AREA`].
+    pub(super) fn mesh(&self, mesh: u32) -> &[u32] {
+        let [start, end] = [mesh, mesh + 1].map(|mesh| self.meshes[mesh as usize] as usize);
+        &self.indices[start..end]
+    }
+
     /// Returns a light by its index among those that may emit: first the triangles, then the lamps, then the instances.
     #[inline]
     pub(crate) fn light(&self, index: u32) -> Light<'_> {
@@ -349,6 +355,7 @@ impl<'a> LightCollection<'a> {
             has_lamps: leaves.iter().any(|index| (first_lamp..first_instance).contains(index)),
             is_crossed_once: false,
             time: 0.0,
+            is_edited: false,
             records,
             cells: self.cells,
             leaf_of,

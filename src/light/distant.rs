@@ -95,6 +95,11 @@ impl DistantRecord {
         DistantLight::new(Vec3::from_array(self.axis), self.irradiance).angular_radius(self.radius)
     }
 
+    /// Number among all lights that are not made of triangles.
+    pub(super) fn number(&self) -> u32 {
+        self.number
+    }
+
     /// Irradiance on a surface that faces the light.
     pub(crate) fn irradiance(&self) -> f32 {
         self.irradiance

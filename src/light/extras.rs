@@ -199,3 +199,65 @@ impl<'a> Extras<'a> {
         self.profiles().validate()
     }
 }
+
+/// Returns the header and the arrays, with room for a header where there was none.
+fn header_mut(extras: &mut Vec<u32>) -> &mut Header {
+    if extras.is_empty() {
+        extras.resize(HEADER, 0);
+    }
+    bytemuck::from_bytes_mut(bytemuck::cast_slice_mut(&mut extras[..HEADER]))
+}
+
+/// Replaces the distant lights and their groups.
+pub(super) fn set_distants(extras: &mut Vec<u32>, distants: &[DistantRecord], distant_groups: &[DistantGroup]) {
+    let header = header_mut(extras);
+    let start = HEADER + header.groups as usize;
+    let end = start + header.distants as usize * DISTANT + header.distant_groups as usize * DISTANT_GROUP;
+    (header.distants, header.distant_groups) = (distants.len() as u32, distant_groups.len() as u32);
+    let words: [&[u32]; 2] = [bytemuck::cast_slice(distants), bytemuck::cast_slice(distant_groups)];
+    extras.splice(start..end, words.concat());
+}
+
+/// Gives every leaf light groups of its own, all for now, if they have none. Returns whether they had none.
+pub(super) fn add_groups(extras: &mut Vec<u32>, leaves: usize) -> bool {
+    let header = header_mut(extras);
+    let is_new = header.groups == 0;
+    if is_new {
+        header.groups = leaves as u32 + 1;
+        extras.splice(HEADER..HEADER, core::iter::repeat_n(ALL_GROUPS, leaves + 1));
+    }
+    is_new
+}
+
+/// Makes room for the light groups of so many leaves, if leaves have light groups, and for more later. Those of the environment
+/// stay the last.
+pub(super) fn resize_groups(extras: &mut Vec<u32>, leaves: usize) {
+    let groups = Extras(extras).header().groups as usize;
+    if groups > 0 && groups < leaves + 1 {
+        let more = (2 * groups).max(leaves + 1) - groups;
+        let end = HEADER + groups - 1;
+        header_mut(extras).groups += more as u32;
+        extras.splice(end..end, core::iter::repeat_n(ALL_GROUPS, more));
+    }
+}
+
+/// Sets the light groups of a leaf, if leaves have light groups.
+pub(super) fn set_groups(extras: &mut [u32], leaf: u32, groups: u32) {
+    let count = Extras(extras).header().groups as usize;
+    if (leaf as usize) + 1 < count {
+        extras[HEADER + leaf as usize] = groups;
+    }
+}
+
+/// Returns the buffer with the light groups of these leaves alone, in this order.
+pub(super) fn in_order(extras: Extras<'_>, leaves: &[u32]) -> Vec<u32> {
+    let header = extras.header();
+    if header.groups == 0 {
+        return extras.0.to_vec();
+    }
+    let own = leaves.iter().map(|&leaf| extras.groups_of(leaf));
+    let groups: Vec<u32> = own.chain([extras.groups_of_environment()]).collect();
+    let profiles = extras.profiles();
+    let arrays = [profiles.starts, bytemuck::cast_slice(profiles.values)];
+    pack(&groups, extras.distants(), extras.distant_groups(), arrays, extras.motion().0)
+}

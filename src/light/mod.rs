@@ -8,6 +8,7 @@ mod cell_kernel;
 mod collect;
 mod crossing;
 mod distant;
+mod edit;
 mod emitted;
 mod energy;
 mod extras;
@@ -41,6 +42,7 @@ use crate::warp::Variate;
 
 pub(crate) use collect::LightCollection;
 pub(crate) use distant::{DistantGroup, DistantRecord, MOST_GROUPS};
+pub(crate) use edit::{EditState, Edited, LightChanges, Unplaced, laid_out};
 pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub(crate) use extras::Extras;
@@ -84,6 +86,8 @@ buffers! {
         is_crossed_once: bool,
         /// Time in the shutter interval, from 0 to 1, at which lights are asked for.
         time: f32,
+        /// Whether edits may have left places free: then bytes hold another layout.
+        is_edited: bool,
     }
     buffers {
         /// Triangles, and lamps in records of the same size, in the order of the tree's leaves.

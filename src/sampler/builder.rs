@@ -7,7 +7,7 @@ use super::lights::LightSampler;
 use crate::blas::{Procedural, Texture};
 use crate::env::{Environment, RegionMoments};
 use crate::error::Error;
-use crate::light::{Energies, Illumination, Instance, Lamp, LightCollection, Mesh, Profile, Projection};
+use crate::light::{Energies, Illumination, Instance, Lamp, LightCollection, Mesh, Profile, Projection, Unplaced};
 use crate::parallel;
 use crate::progress::{Progress, Report};
 use crate::receiver::ALL_GROUPS;
@@ -326,10 +326,21 @@ impl<'a> LightSamplerBuilder<'a> {
         let groups = collection.groups(&emitting);
         let (tlas, order) = tlas::build_in_groups(self.arity, emitting.len(), &bounds, &groups, &progress)?;
         let leaves = parallel::collect(order.len(), |leaf| emitting[order[leaf] as usize]);
+        let unplaced = Unplaced::of(&mut collection);
         let lights = collection.into_lights(self.illumination, &leaves);
         let is_light = self.environment_as_light && environment.mean() > 0.0;
         let sky = is_light.then(|| RegionMoments::new(&environment.as_view()));
-        let mut sampler = LightSampler { tlas, lights, environment, sky, cost: 1.0, cost_at_build: 1.0 };
+        let mut sampler = LightSampler {
+            tlas,
+            lights,
+            environment,
+            sky,
+            cost: 1.0,
+            cost_at_build: 1.0,
+            arity: self.arity,
+            unplaced,
+            edits: None,
+        };
         sampler.fit();
         sampler.cost_at_build = sampler.cost;
         progress.finish()?;

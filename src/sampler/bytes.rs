@@ -13,7 +13,7 @@ use crate::blas;
 use crate::buffers::{Section, Sections, write};
 use crate::env::{EnvironmentView, RegionMoments};
 use crate::error::{Error, ErrorKind};
-use crate::light::{Illumination, LightsView};
+use crate::light::{Illumination, LightsView, laid_out};
 use crate::technique::LightScene;
 use crate::tlas::{Arity, TlasView};
 
@@ -46,9 +46,15 @@ const REGIONS: ([u8; 4], u32) = (*b"EREG", 1);
 
 impl<'a> LightSamplerView<'a> {
     /// Returns everything as bytes, to be written to disk, mapped, shared or uploaded, and to be read by
-    /// [`Self::from_bytes`] on a machine of the same byte order.
+    /// [`Self::from_bytes`] on a machine of the same byte order. Of an [edited](crate::LightSampler::edit) sampler, the bytes hold no
+    /// free places, and give the same samples.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
+        if self.scene.lights.is_edited {
+            let (lights, tlas) = laid_out(&self.scene.lights, &self.scene.tlas);
+            let scene = LightScene { tlas: tlas.view(), lights: lights.view(), ..self.scene };
+            return LightSamplerView { scene, visibility: self.visibility }.to_bytes();
+        }
         let LightScene { tlas, lights, environment, sky } = &self.scene;
         let parameters = [Parameters {
             light_arity: tlas.arity.code(),
@@ -117,6 +123,7 @@ impl<'a> LightSamplerView<'a> {
             has_lamps != 0,
             is_crossed_once != 0,
             0.0,
+            false,
         )?;
         let environment = EnvironmentView::from_all_sections(&mut sections)?;
         let sky = if has_sky == 0 { None } else { Some(take_regions(&mut sections)?) };

@@ -8,11 +8,11 @@ use super::emission::Emission;
 use super::point::PointSampler;
 use crate::env::{Environment, EnvironmentView, RegionMoments};
 use crate::error::Error;
-use crate::light::{Lights, LightsView};
+use crate::light::{EditState, Lights, LightsView, Unplaced};
 use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
 use crate::technique::{LightScene, Viewpoint};
-use crate::tlas::Tlas;
+use crate::tlas::{Arity, Tlas};
 use crate::visibility::VisibilityView;
 
 /// All lights of a scene, ready to be sampled.
@@ -29,6 +29,12 @@ pub struct LightSampler {
     pub(super) cost: f64,
     /// Cost of the tree as it was built.
     pub(super) cost_at_build: f64,
+    /// Arity of a tree of many lights.
+    pub(super) arity: Arity,
+    /// What is there for edits alone.
+    pub(super) unplaced: Unplaced,
+    /// What edits need to know, from the first one on.
+    pub(super) edits: Option<Box<EditState>>,
 }
 
 /// All lights of a scene in borrowed memory: plain data that can be mapped from a file or shared between processes.
@@ -43,7 +49,7 @@ pub struct LightSamplerView<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ByteSizes {
-    /// Tree over the lights.
+    /// Tree over the lights, and what edits need beside it.
     pub light_tree: usize,
     /// The lights themselves, and the ways from ids to lights; objects, with their own light trees, and instances.
     pub lights: usize,
@@ -128,7 +134,9 @@ impl LightSampler {
     /// Returns the number of bytes that the structures take.
     #[must_use]
     pub fn bytes(&self) -> ByteSizes {
-        self.as_view().bytes()
+        let mut bytes = self.as_view().bytes();
+        bytes.light_tree += self.edits.as_ref().map_or(0, |edits| edits.byte_size());
+        bytes
     }
 
     /// Returns everything as bytes: see [`LightSamplerView::to_bytes`].
@@ -159,7 +167,9 @@ impl<'a> LightSamplerView<'a> {
     /// object counts once for each of the object's instances.
     #[must_use]
     pub fn light_count(&self) -> usize {
-        self.scene.lights.count() + self.scene.lights.extras().distants().len()
+        let LightScene { tlas, lights, .. } = &self.scene;
+        let free = if lights.is_edited { tlas.free_leaf_count() } else { 0 };
+        lights.count() - free + lights.extras().distants().len()
     }
 
     /// Returns the number of bytes that the structures take.

@@ -3,6 +3,7 @@
 mod builder;
 mod bytes;
 mod distant_rays;
+mod edit;
 mod emission;
 mod finite;
 mod lights;
@@ -14,6 +15,7 @@ mod segment;
 mod visibility;
 
 pub use builder::LightSamplerBuilder;
+pub use edit::LightEdits;
 pub use emission::{Emission, EmissionSample};
 pub use lights::{ByteSizes, LightSampler, LightSamplerView};
 pub use point::PointSampler;

@@ -16,6 +16,8 @@ impl LightSampler {
     /// What emitted nothing when the sampler was built is not in it: black triangles stay black, and a triangle that had no
     /// area must not get any.
     ///
+    /// A sampler that has been [edited](Self::edit) edits this as well.
+    ///
     /// After an error the sampler is as it was before.
     ///
     /// # Errors
@@ -24,6 +26,11 @@ impl LightSampler {
     /// 1e9, there are not as many vertices at the end of the shutter interval, an index has no vertex, a factor or a weight multiplied by it is NaN, negative or above 1e30, or a triangle
     /// without area has become one with an area.
     pub fn refit(&mut self, updates: &[MeshUpdate<'_>]) -> Result<(), Error> {
+        if self.edits.is_some() {
+            let mut edits = self.edit();
+            updates.iter().try_for_each(|update| edits.update_mesh(update))?;
+            return edits.apply();
+        }
         self.lights.update(updates)?;
         self.fit();
         Ok(())
@@ -42,6 +49,11 @@ impl LightSampler {
     /// and the light that was added emitted nothing, or one of both is a [`DistantLight`](crate::DistantLight) and the other is
     /// not.
     pub fn refit_lights(&mut self, updates: &[(LightId, Lamp)]) -> Result<(), Error> {
+        if self.edits.is_some() {
+            let mut edits = self.edit();
+            updates.iter().try_for_each(|&(id, light)| edits.set_light(id, light))?;
+            return edits.apply();
+        }
         self.lights.update_lamps(updates)?;
         self.fit();
         Ok(())
@@ -60,6 +72,11 @@ impl LightSampler {
     /// If there is no such instance, it was one of another object, or
     /// [`add_instance`](crate::LightSamplerBuilder::add_instance) would refuse the new one.
     pub fn refit_instances(&mut self, updates: &[(InstanceId, Instance)]) -> Result<(), Error> {
+        if self.edits.is_some() {
+            let mut edits = self.edit();
+            updates.iter().try_for_each(|(id, instance)| edits.replace_instance(*id, instance))?;
+            return edits.apply();
+        }
         self.lights.update_instances(updates)?;
         self.fit();
         Ok(())
@@ -68,7 +85,8 @@ impl LightSampler {
     /// Returns the cost of the tree in relation to its cost when it was built, by the surface area orientation heuristic.
     ///
     /// The result is 1 after the build, and after a motion of everything as a whole. At 1.5 samples are noisier by about a
-    /// third than those of a new build, at 2 by about a factor of two: rebuild somewhere in between.
+    /// third than those of a new build, at 2 by about a factor of two: rebuild somewhere in between. [Edits](Self::edit) build
+    /// parts of the tree again by themselves; when they have built all of it, the result is 1 again.
     #[must_use]
     pub fn decay(&self) -> f32 {
         (self.cost / self.cost_at_build) as f32

@@ -47,7 +47,8 @@ impl LightScene<'_> {
 
     /// Calls `visit` for every light.
     pub(super) fn for_each_light(&self, mut visit: impl FnMut(LightLeaf)) {
-        for leaf in 0..self.lights.len() as u32 {
+        let leaves = 0..self.lights.len() as u32;
+        for leaf in leaves.filter(|&leaf| !self.lights.is_edited || self.tlas.has_leaf(leaf)) {
             self.visit_within(leaf, &mut visit, |placed, visit| (0..placed.count()).for_each(visit));
         }
     }

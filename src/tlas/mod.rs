@@ -5,6 +5,7 @@
 
 mod arity;
 mod build;
+mod edit;
 mod node;
 #[cfg(test)]
 mod tests;
@@ -17,6 +18,7 @@ pub use arity::Arity;
 #[cfg(test)]
 use build::build;
 pub(crate) use build::build_in_groups;
+pub(crate) use edit::{LeafStore, TreeEdit, TreeState, relayout};
 pub(crate) use tree::{MAX_LEAVES, Tlas, TlasView};
 pub use walk::Splitting;
 pub(crate) use walk::{

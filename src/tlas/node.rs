@@ -216,14 +216,17 @@ pub(crate) struct Slot(u32);
 impl Slot {
     /// Slot of the root, which no lane refers to.
     pub(super) const ROOT: Self = Self(u32::MAX);
+    /// Slot of a place that an edit has left free. Nothing refers to the place, and bytes hold none. *Format*: as many nodes as
+    /// have a slot of this number are never built.
+    pub(super) const FREE: Self = Self(u32::MAX - 1);
 
     pub(super) fn new<const N: usize>(node: usize, lane: usize) -> Self {
         Self((node * N + lane) as u32)
     }
 
-    /// Returns node and lane, or `None` for the root.
+    /// Returns node and lane, or `None` for the root and for a place that is free.
     #[inline]
     pub(super) fn get<const N: usize>(self) -> Option<(usize, usize)> {
-        (self != Self::ROOT).then_some((self.0 as usize / N, self.0 as usize % N))
+        (self.0 < Self::FREE.0).then_some((self.0 as usize / N, self.0 as usize % N))
     }
 }

@@ -82,6 +82,16 @@ impl Tlas {
 }
 
 impl<'a> TlasView<'a> {
+    /// Whether a leaf is in use, as all are in a tree that has not been edited.
+    pub(crate) fn has_leaf(&self, leaf: u32) -> bool {
+        self.leaves[leaf as usize] != Slot::FREE
+    }
+
+    /// Returns the number of leaves that an edit has left free.
+    pub(crate) fn free_leaf_count(&self) -> usize {
+        self.leaves.iter().filter(|slot| **slot == Slot::FREE).count()
+    }
+
     /// Returns the tree with nodes of its arity, which must be `N`. Words that are no whole number of nodes, which
     /// validation refuses, give no node.
     #[inline(always)]

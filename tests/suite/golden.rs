@@ -9,6 +9,7 @@ use crate::common::lights::{ARITIES, build, sample_from_bytes, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Scene, random_point};
+use crate::edits::edited;
 use crate::groups::scene as grouped;
 use crate::instances;
 use crate::instances::town::Town;
@@ -38,8 +39,10 @@ const MOVING: usize = 6;
 const LIST: &str = if cfg!(feature = "std") { "std.txt" } else { "libm.txt" };
 /// Scenes at points with microfacets, after those at points with lobes.
 const MICROFACETS: usize = 20;
-/// Scenes with projections, at last.
+/// Scenes with projections.
 const PROJECTIONS: usize = 6;
+/// Scenes that are edited.
+const EDITED: usize = 12;
 
 /// The same scenes at points with lobes.
 const LOBES: &str = if cfg!(feature = "std") { "lobes-std.txt" } else { "lobes-libm.txt" };
@@ -288,6 +291,33 @@ fn line_of_projections(number: usize) -> String {
     format!("{number:2} projections {drawn:5} {:016x}\n", hash.0)
 }
 
+/// One line about a scene that is edited.
+fn line_of_edited(number: usize) -> String {
+    let (_, lights) = edited(number as u64, number, 30);
+    let mut pcg = Pcg32::new(number as u64, 83);
+    let splitting = Splitting::new(0.7, 2);
+    let (mut hash, mut drawn) = (Hash::new(), 0);
+    let emission = lights.emission();
+    hash.add(&[lights.decay()]);
+    for i in 0..POINTS {
+        let x = random_point(&mut pcg, i);
+        let at = lights.at(&x);
+        let u = pcg.cube();
+        for sample in at.sample(u).iter().chain(sample_split(&at, u, &splitting).iter().take(8)) {
+            drawn += 1;
+            let id = sample.light.id().map_or(u32::MAX, |id| id.index());
+            hash.add(&[f32::from_bits(id), sample.distance, sample.pdf, sample.pdf_area, sample.pmf]);
+            [sample.position, sample.normal, sample.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[at.pdf_direction(sample.direction), at.pdf_sample_direction(sample)]);
+        }
+        if let Some(ray) = emission.sample(core::array::from_fn(|_| pcg.f32())) {
+            [ray.position, ray.normal, ray.direction].iter().for_each(|v| hash.add(&v.to_array()));
+            hash.add(&[ray.pdf, ray.pmf, emission.pdf_ray(x.position, pcg.direction())]);
+        }
+    }
+    format!("{number:2} edited {drawn:5} {:016x}\n", hash.0)
+}
+
 #[test]
 fn samples_and_densities_are_those_of_before() {
     compare(LIST, false);
@@ -302,7 +332,7 @@ fn samples_and_densities_of_lobes_are_those_of_before() {
 type Lines = Box<dyn Fn(usize) -> String + Sync>;
 
 /// What is listed after the random scenes: how many lines, and each.
-fn more() -> [(usize, Lines); 7] {
+fn more() -> [(usize, Lines); 8] {
     [
         (KINDS, Box::new(line_of_kinds)),
         (GROUPS, Box::new(line_of_groups)),
@@ -311,15 +341,16 @@ fn more() -> [(usize, Lines); 7] {
         (LEAST, Box::new(line_of_least)),
         (MOVING, Box::new(line_of_motion)),
         (PROJECTIONS, Box::new(line_of_projections)),
+        (EDITED, Box::new(line_of_edited)),
     ]
 }
 
 fn compare(list: &str, has_lobes: bool) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(list);
-    let random = |shading_point| Box::new(move |i| line(i, shading_point)) as Lines;
-    let mut lists = vec![(SCENES, random(if has_lobes { shading_point_with_lobe } else { shading_point }))];
+    let random = |first, shading_point| Box::new(move |i| line(first + i, shading_point)) as Lines;
+    let mut lists = vec![(SCENES, random(0, if has_lobes { shading_point_with_lobe } else { shading_point }))];
     if has_lobes {
-        lists.push((MICROFACETS, random(shading_point_with_microfacets)));
+        lists.push((MICROFACETS, random(SCENES, shading_point_with_microfacets)));
     } else {
         lists.extend(more());
     }

@@ -15,6 +15,7 @@ mod chi_square;
 mod distant;
 mod docs;
 mod double_check;
+mod edits;
 mod emission;
 mod environment_light;
 mod errors;

@@ -32,7 +32,7 @@ use crate::receiver::{ALL_GROUPS, ShadingPoint};
 use crate::record::ObjectId;
 
 pub(super) use collect::{AddedObject, emits};
-pub(super) use object::Object;
+pub(super) use object::{Object, object_records_mut, object_starts};
 pub(crate) use triangle::PlacedTriangle;
 pub(crate) use walk::ObjectWalk;
 
@@ -172,10 +172,10 @@ fn corners([low, high]: [Vec3; 2]) -> impl Iterator<Item = Vec3> {
 }
 
 /// Words of a record. *Format.*
-const RECORD_WORDS: usize = size_of::<InstanceRecord>() / size_of::<u32>();
+pub(super) const RECORD_WORDS: usize = size_of::<InstanceRecord>() / size_of::<u32>();
 
 /// Returns the first word of the first object after so many instances.
-fn first_object(instances: usize) -> usize {
+pub(super) fn first_object(instances: usize) -> usize {
     1 + instances * RECORD_WORDS
 }
 
@@ -189,7 +189,7 @@ pub(super) fn records(words: &[u32]) -> &[InstanceRecord] {
 }
 
 /// Returns the records of all instances, to be changed.
-fn records_mut(words: &mut [u32]) -> &mut [InstanceRecord] {
+pub(super) fn records_mut(words: &mut [u32]) -> &mut [InstanceRecord] {
     let Some((&mut count, rest)) = words.split_first_mut() else { return &mut [] };
     let words = rest.get_mut(..(count as usize).saturating_mul(RECORD_WORDS)).unwrap_or(&mut []);
     bytemuck::try_cast_slice_mut(words).unwrap_or(&mut [])

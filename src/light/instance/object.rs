@@ -159,7 +159,7 @@ impl<'a> Object<'a> {
     }
 
     /// Returns the corners of the box around all triangles that can emit.
-    pub(super) fn corners(&self) -> [Vec3; 2] {
+    pub(in crate::light) fn corners(&self) -> [Vec3; 2] {
         [self.header.low, self.header.high].map(Vec3::from)
     }
 
@@ -270,4 +270,32 @@ impl ObjectParts<'_> {
 /// Returns the root of a mean square that rounding may have made negative.
 pub(super) fn root_of(square: f64) -> f64 {
     sqrt64(square.max(0.0))
+}
+
+/// Returns the first word of every object, after those of all instances: of `words`, or of `alone` where there is no instance.
+pub(in crate::light) fn object_starts(words: &[u32], alone: &[u32]) -> Vec<u32> {
+    let first = super::first_object(super::records(words).len()).min(words.len());
+    let objects = if words.is_empty() { alone } else { &words[first..] };
+    let mut starts = Vec::new();
+    let mut start = 0;
+    while start < objects.len() {
+        starts.push(start as u32);
+        start += Object::at(objects, start as u32).header.words as usize;
+    }
+    starts
+}
+
+/// Calls `change` for the record of every triangle of every object.
+pub(in crate::light) fn object_records_mut(words: &mut [u32], mut change: impl FnMut(&mut LightTriangle)) {
+    let mut start = super::first_object(super::records(words).len());
+    while start < words.len() {
+        let object = Object::at(words, start as u32);
+        let (end, lights) = (start + object.header.words as usize, object.len());
+        let tree = TlasView::word_count(object.tree().arity, object.header.nodes as usize, lights).unwrap_or(0);
+        let first = start + HEADER_WORDS + tree;
+        let records = words.get_mut(first..first + lights * RECORD_WORDS).unwrap_or(&mut []);
+        let records: &mut [LightTriangle] = bytemuck::try_cast_slice_mut(records).unwrap_or(&mut []);
+        records.iter_mut().for_each(&mut change);
+        start = end;
+    }
 }

@@ -104,6 +104,11 @@ impl<'a> Motion<'a> {
         bytemuck::cast_slice(self.words(self.words_before_instances() + instances, instances * COLUMNS))
     }
 
+    /// Whether the mesh whose first triangle has this number moves.
+    pub(super) fn moves_mesh(self, first: u32) -> bool {
+        self.meshes().binary_search_by_key(&first, |mesh| mesh.first).is_ok()
+    }
+
     /// Returns the vertices of a triangle at the end, by its number among all that were added; `None` for one that stands still.
     pub(super) fn end_of_triangle(self, index: u32) -> Option<&'a EndVertices> {
         let meshes = self.meshes();

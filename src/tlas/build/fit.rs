@@ -22,13 +22,13 @@ struct Subtree<'a, const N: usize> {
 }
 
 /// Summary of a child for the node above it.
-#[derive(Clone, Copy)]
-struct Fitted {
-    bounds: LightBounds,
+#[derive(Clone, Copy, Debug)]
+pub(in crate::tlas) struct Fitted {
+    pub(in crate::tlas) bounds: LightBounds,
     moments: Moments,
     /// Number of leaves, and the sums of their energies and of the squares of these.
     count: f64,
-    sum: f64,
+    pub(in crate::tlas) sum: f64,
     squares: f64,
     /// Costs in the surface area orientation heuristic of all lanes below.
     cost: f64,
@@ -54,8 +54,21 @@ impl Tlas {
             let scale = 1.0 / root.sum;
             self.spreads.iter_mut().for_each(|spread| spread.scale(scale));
         }
-        let whole = root.bounds.cost();
-        if whole > 0.0 { root.cost / whole } else { 1.0 }
+        root.relative_cost()
+    }
+}
+
+impl<const N: usize> Node<N> {
+    /// Writes what is known of all children, in the order of the lanes. Returns what is known of the node.
+    pub(in crate::tlas) fn fit(&mut self, lanes: &[Fitted]) -> (Fitted, Spread) {
+        if lanes.is_empty() {
+            return (Fitted::NONE, Spread::default());
+        }
+        let known: SmallVec<[_; MAX_LANES]> = lanes.iter().map(|lane| (lane.bounds, lane.moments)).collect();
+        self.set(&known);
+        let whole = lanes.iter().copied().reduce(|whole, lane| whole.union(&lane)).unwrap_or(Fitted::NONE);
+        let cost = whole.cost + lanes.iter().map(|lane| lane.bounds.cost()).sum::<f64>();
+        (Fitted { cost, ..whole }, whole.spread())
     }
 }
 
@@ -72,12 +85,9 @@ impl<const N: usize> Subtree<'_, N> {
                 Child::Node(_) => subtrees.next().map(|subtree| subtree.fitted),
             })
             .collect();
-        let known: SmallVec<[_; MAX_LANES]> = lanes.iter().map(|lane| (lane.bounds, lane.moments)).collect();
-        self.node.set(&known);
-        let whole = lanes.iter().copied().reduce(|whole, lane| whole.union(&lane)).unwrap_or(Fitted::NONE);
-        *self.spread = whole.spread();
-        let cost = whole.cost + lanes.iter().map(|lane| lane.bounds.cost()).sum::<f64>();
-        Fitted { cost, ..whole }
+        let (fitted, spread) = self.node.fit(&lanes);
+        *self.spread = spread;
+        fitted
     }
 }
 
@@ -112,12 +122,28 @@ fn divide<'a, const N: usize>(
 }
 
 impl Fitted {
-    const NONE: Self =
+    pub(in crate::tlas) const NONE: Self =
         Self { bounds: LightBounds::NONE, moments: Moments::NONE, count: 0.0, sum: 0.0, squares: 0.0, cost: 0.0 };
 
-    fn leaf((bounds, moments): (LightBounds, Moments)) -> Self {
+    pub(in crate::tlas) fn leaf((bounds, moments): (LightBounds, Moments)) -> Self {
         let energy = f64::from(bounds.energy());
         Self { bounds, moments, count: 1.0, sum: energy, squares: energy * energy, cost: 0.0 }
+    }
+
+    /// Returns the number of leaves.
+    pub(in crate::tlas) fn leaf_count(&self) -> f32 {
+        self.count as f32
+    }
+
+    /// Returns the cost of all lanes below, relative to that of the whole.
+    pub(in crate::tlas) fn relative_cost(&self) -> f64 {
+        let whole = self.bounds.cost();
+        if whole > 0.0 { self.cost / whole } else { 1.0 }
+    }
+
+    /// Returns the summary of both, of which this may be that of no leaf.
+    pub(in crate::tlas) fn joined(&self, other: &Self) -> Self {
+        if self.count > 0.0 { self.union(other) } else { *other }
     }
 
     fn union(&self, other: &Self) -> Self {

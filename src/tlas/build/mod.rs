@@ -21,6 +21,8 @@ use cluster::Item;
 use collapse::collapse;
 use groups::divide_groups;
 
+pub(super) use fit::Fitted;
+
 use crate::bounds::LightBounds;
 use crate::parallel;
 use crate::progress::{Cancelled, Progress};
@@ -69,4 +71,21 @@ pub(crate) fn build_in_groups(
         tlas.note_groups(|leaf| groups[order[leaf as usize] as usize]);
     }
     Ok((tlas, order))
+}
+
+/// Arranges lights in a tree of just this arity, without a look at their sizes or groups: a part of a larger tree. Returns what
+/// [`build_in_groups`] does; `None` for fewer than two lights.
+pub(super) fn arrange(arity: Arity, lights: &[LightBounds]) -> Option<(Tlas, Vec<u32>)> {
+    let count = lights.len();
+    if count < 2 {
+        return None;
+    }
+    let mut items = parallel::collect(count, |i| Item::new(&lights[i], i as u32));
+    let mut binary = vec![BinaryNode::default(); 2 * count - 1];
+    join(&mut items, &mut binary, &[count], &Progress::new(None, 1.0));
+    Some(match arity {
+        Arity::Four => collapse::<4>(arity, &binary),
+        Arity::Eight => collapse::<8>(arity, &binary),
+        Arity::Sixteen => collapse::<16>(arity, &binary),
+    })
 }

@@ -3,9 +3,9 @@
 use std::sync::OnceLock;
 
 use fanlight::{
-    DiskLight, DistantLight, Environment, Filter, Illumination, Instance, Lamp, LightSample, LightSampler,
-    LightSamplerBuilder, Mesh, PointLight, Profile, ProfileLight, Projection, ShadingPoint, Sides, SphereLight,
-    SpotLight, Texture, TextureId, TubeLight, Visibility, Weight, Wrap,
+    DiskLight, DistantLight, Environment, Filter, Illumination, Instance, InstanceId, Lamp, LightId, LightSample,
+    LightSampler, LightSamplerBuilder, Mesh, MeshId, MeshUpdate, ObjectId, PointLight, Profile, ProfileLight,
+    Projection, ShadingPoint, Sides, SphereLight, SpotLight, Texture, TextureId, TubeLight, Visibility, Weight, Wrap,
 };
 use glam::{Affine3A, Mat3, Quat, Vec2, Vec3, Vec3Swizzles};
 
@@ -56,6 +56,45 @@ fn add_instances(builder: &mut LightSamplerBuilder<'_>, meshes: &[Soup], texture
         }
         let _ = builder.add_instance(Instance::new(object, Affine3A::from_translation(frame.positions[0])));
     }
+}
+
+/// Makes some edits, of which any may be refused, and applies the others.
+pub(crate) fn edit(lights: &mut LightSampler, reader: &mut Reader<'_>) {
+    let images: Vec<Image> = (0..reader.below(2)).map(|_| Image::read(reader)).collect();
+    let mut edits = lights.edit();
+    let textures: Vec<TextureId> =
+        images.iter().filter_map(|image| Some(edits.add_texture(image.texture()?))).collect();
+    for _ in 0..reader.below(12) {
+        let (action, number) = (reader.below(9), reader.below(6) as u32);
+        let instance = |reader: &mut Reader<'_>| {
+            let [x, y, z, place] = [(); 4].map(|()| reader.vector());
+            let transform = Affine3A::from_mat3_translation(Mat3::from_cols(x, y, z), place);
+            Instance::new(ObjectId::from_index(number % 3), transform).scaled(reader.float())
+        };
+        // What is refused leaves the batch as it was.
+        let _ = match action {
+            0..3 => {
+                let soup = Soup { indices: Vec::new(), ..Soup::read(reader) };
+                let id = LightId::from_index(number);
+                match soup.lamp(&mut LightSampler::builder()) {
+                    Some(lamp) if action == 0 => edits.add_light_to(soup.groups(), lamp).map(drop),
+                    Some(lamp) if action == 1 => edits.set_light(id, lamp),
+                    _ => edits.remove_light(id),
+                }
+            }
+            3 => edits.add_mesh(&Soup::read(reader).mesh(&textures)).map(drop),
+            4 => {
+                let soup = Soup::read(reader);
+                let update = MeshUpdate::new(MeshId::from_index(number)).scaled(reader.float());
+                edits.update_mesh(&update.moved(&soup.positions, &soup.indices)).or(edits.update_mesh(&update))
+            }
+            5 => edits.remove_mesh(MeshId::from_index(number)),
+            6 => edits.add_instance(instance(reader)).map(drop),
+            7 => edits.set_instance(InstanceId::from_index(number), instance(reader)),
+            _ => edits.remove_instance(InstanceId::from_index(number)),
+        };
+    }
+    let _ = edits.apply();
 }
 
 /// The bytes of lights that are accepted, of several kinds. Each is built once only.

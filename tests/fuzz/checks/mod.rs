@@ -19,15 +19,25 @@ const TOLERANCE: f32 = 1e-5;
 /// Builds a scene from the bytes, and samples it if it is accepted.
 pub(crate) fn scene(data: &[u8]) {
     let mut reader = Reader::new(data);
-    let Some(lights) = build::lights(&mut reader) else { return };
-    let view = lights.as_view();
+    let Some(mut lights) = build::lights(&mut reader) else { return };
     loop {
-        sample(&view, &mut reader);
+        sample(&lights.as_view(), &mut reader);
         emit(&lights, &mut reader);
         if reader.is_empty() {
-            return;
+            break;
         }
     }
+    // By the same bytes once more, so that inputs that were found keep their meaning.
+    let mut reader = Reader::new(data);
+    for _ in 0..3 {
+        build::edit(&mut lights, &mut reader);
+        sample(&lights.as_view(), &mut reader);
+        emit(&lights, &mut reader);
+    }
+    let mut room = Vec::new();
+    let bytes = lights.to_bytes();
+    let view = LightSamplerView::from_bytes(aligned(&bytes, &mut room)).expect("its own bytes load");
+    sample(&view, &mut reader);
 }
 
 /// Loads bytes: those of a sampler with some of them changed, or, if the first one says so, the given ones as they are.

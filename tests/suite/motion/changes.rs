@@ -3,10 +3,12 @@
 use super::{Case, close};
 use crate::common::lights::{ARITIES, aligned};
 use crate::common::parallel;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::random_point;
 use crate::common::tier::tier;
 use crate::instances::check_agreement;
 use fanlight::{
-    Instance, InstanceId, LightSampler, LightSamplerView, Mesh, MeshId, MeshUpdate, ShadingPoint, TriangleId,
+    Instance, InstanceId, LightSampler, LightSamplerView, Mesh, MeshId, MeshUpdate, ShadingPoint, Sides, TriangleId,
 };
 use glam::{Affine3A, Vec3};
 
@@ -195,4 +197,70 @@ fn errors_name_what_cannot_move() {
     let mirrored = still.moving_to(Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0)));
     assert!(message(lights.refit_instances(&[(InstanceId::from_index(0), mirrored)])).contains("inverted is 0.5"));
     assert_eq!(lights.to_bytes(), bytes, "an error changes nothing");
+}
+
+/// A triangle of two sides that may move.
+fn lamp<'a>(positions: &'a [Vec3; 3], end: Option<&'a [Vec3; 3]>) -> Mesh<'a> {
+    let mesh = Mesh::emitter(positions, &[[0, 1, 2]]).sides(Sides::Two);
+    end.map_or(mesh, |end| mesh.moving_to(end))
+}
+
+/// Where edits take away half of what stands still and add something else, what moves goes on as in a new build, and is refused
+/// if it is edited itself.
+#[test]
+fn edits_leave_what_moves() {
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let place = |x: f32| corners.map(|corner| corner + Vec3::new(x, 0.3 * x, 2.0));
+    let shift = |x: f32| Affine3A::from_translation(Vec3::new(x, -1.0, 1.0));
+    // Some move and some stand still; `is_edited` leaves out what edits remove, and has what they add.
+    let build = |is_edited: bool| {
+        let mut builder = LightSampler::builder();
+        let object = builder.add_object(&[lamp(&corners, None)]).expect("a valid object");
+        let places = [0.0, 1.0, 2.0, 3.0].map(place);
+        let added = if is_edited { place(-2.0) } else { places[1] };
+        let meshes = [lamp(&places[0], Some(&places[2])), lamp(&added, None), lamp(&places[3], Some(&places[1]))];
+        for mesh in &meshes {
+            builder.add_mesh(mesh).expect("a valid mesh");
+        }
+        let still = if is_edited { -1.0 } else { 1.0 };
+        builder.add_instance(Instance::new(object, shift(still))).expect("a valid instance");
+        builder.add_instance(Instance::new(object, shift(2.0)).moving_to(shift(-2.0))).expect("a valid instance");
+        (builder.build().expect("few lights"), object)
+    };
+    let (mut edited, object) = build(false);
+    let (fresh, _) = build(true);
+    let mut edits = edited.edit();
+    let (moving, still) = (MeshId::from_index(0), MeshId::from_index(1));
+    edits.remove_mesh(still).expect("it stands still");
+    edits.add_mesh(&lamp(&place(-2.0), None)).expect("a valid mesh");
+    let instance = Instance::new(object, shift(-1.0));
+    edits.set_instance(InstanceId::from_index(0), instance).expect("it stands still");
+    assert_eq!(
+        message(edits.remove_mesh(moving)),
+        "mesh 0 moves while the shutter is open, which only a new build can begin, change or end"
+    );
+    for text in [
+        message(edits.update_mesh(&MeshUpdate::new(moving).scaled(2.0))),
+        message(edits.add_mesh(&lamp(&place(0.0), Some(&place(1.0))))),
+        message(edits.set_instance(InstanceId::from_index(0), instance.moving_to(shift(1.0)))),
+        message(edits.add_instance(instance.moving_to(shift(1.0)))),
+        message(edits.remove_instance(InstanceId::from_index(1))),
+    ] {
+        assert!(text.contains("moves while the shutter is open"), "{text}");
+    }
+    edits.apply().expect("a valid batch");
+    let words = aligned(&edited.to_bytes());
+    let loaded = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+    let mut pcg = Pcg32::new(17, 313);
+    for kind in 0..24 {
+        let x = random_point(&mut pcg, kind).at_time(kind as f32 / 23.0);
+        check_agreement(&loaded, &x, &mut pcg, 50);
+        let [a, b] = [&loaded, &fresh.as_view()].map(|lights| {
+            let at = lights.at(&x);
+            super::estimate(&at, &mut pcg, 4000, |sample| f64::from(x.cosine(sample.direction)))
+        });
+        // Two-sided, 1e-6 by the normal distribution.
+        let limit = 4.9 * (a.error() + b.error()) + 1e-6;
+        assert!((a.mean() - b.mean()).abs() <= limit, "{x:?}: {} and {}", a.mean(), b.mean());
+    }
 }
