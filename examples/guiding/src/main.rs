@@ -202,13 +202,12 @@ fn reference(scene: &Scene, lights: &LightSampler) -> Result<Vec<f64>, fanlight:
         for _ in 0..REFERENCE {
             let (mut x, mut normal, mut throughput) = (floor(pixel, random.take()), Vec3::Z, 1.0);
             for _ in 0..BOUNCES {
-                if let Some(sample) = view.at(&ShadingPoint::surface(x, normal)).sample(random.take()) {
-                    if let Some(hit) = scene.trace(x, sample.direction).filter(|hit| hit.radiance > 0.0) {
-                        if hit.position.distance(sample.position) < 1e-2 {
-                            let cosine = normal.dot(sample.direction).max(0.0);
-                            sum += f64::from(throughput * ALBEDO / PI * cosine * hit.radiance / sample.pdf);
-                        }
-                    }
+                if let Some(sample) = view.at(&ShadingPoint::surface(x, normal)).sample(random.take())
+                    && let Some(hit) = scene.trace(x, sample.direction).filter(|hit| hit.radiance > 0.0)
+                    && hit.position.distance(sample.position) < 1e-2
+                {
+                    let cosine = normal.dot(sample.direction).max(0.0);
+                    sum += f64::from(throughput * ALBEDO / PI * cosine * hit.radiance / sample.pdf);
                 }
                 let Some(hit) = scene.trace(x, cosine_direction(normal, random.take())) else { break };
                 (x, normal, throughput) = (hit.position, hit.normal, throughput * ALBEDO);
