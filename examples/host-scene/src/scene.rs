@@ -80,7 +80,7 @@ impl Scene for World {
         let lamp = |number: u8| {
             let turn = TAU * f32::from(number) / f32::from(LAMPS);
             let place = F3::new(2.6 * turn.cos(), 1.3 + (3.0 * turn).sin(), 2.0 * turn.sin());
-            let radiance = if number % 10 == 0 { 150.0 } else { 5.0 };
+            let radiance = if number.is_multiple_of(10) { 150.0 } else { 5.0 };
             AnalyticalLight::spherical(place, 0.04, F3::new(0.9, 1.0, 0.8).mult_f(&radiance))
         };
         let mut camera: Box<dyn Camera3D> = Box::new(Pinhole::new());
