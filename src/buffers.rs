@@ -247,7 +247,7 @@ macro_rules! buffers {
             /// Borrows the buffers from their sections. What they hold is not checked here.
             pub(crate) fn from_sections(
                 sections: &mut $crate::buffers::Sections<'a>,
-                $($plain: $plain_type,)*
+                ($($plain,)*): ($($plain_type,)*),
             ) -> Result<Self, $crate::error::Error> {
                 Ok(Self { $($plain,)* $($buffer: sections.take(*$tag, $version, stringify!($buffer))?,)* })
             }
@@ -312,7 +312,7 @@ mod tests {
 
     fn read(words: &[u32]) -> Result<Pair, Error> {
         let mut sections = Sections::new(bytemuck::cast_slice(words))?;
-        let view = PairView::from_sections(&mut sections, 7)?;
+        let view = PairView::from_sections(&mut sections, (7,))?;
         sections.end()?;
         Ok(Pair { count: view.count, numbers: view.numbers.to_vec(), halves: view.halves.to_vec() })
     }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use glam::Vec3;
 use lexopt::prelude::*;
 
 use crate::render::{Budget, Error};
@@ -18,7 +19,8 @@ Usage: cargo run --release -p fanlight-gallery -- NAME | all | FILE.gltf | FILE.
   export DIR       writes all built-in scenes as glTF
 
 Options:
-  --seconds S             time for each image; their reference takes four times that [5]
+  --seconds S             processor time for each image; their reference takes four times that of all [5]
+  --images N              images of each kind, with other random numbers; several give intervals of 95 % [1]
   --spp N                 samples a pixel instead of a time
   --size WxH              pixels of an image [208x156]
   --seed N                which random numbers are used [1]
@@ -28,8 +30,10 @@ Options:
 For a FILE:
   --list                  print what the file holds, and what became a light or a portal; render nothing
   --portal-prefix PREFIX  meshes whose material's name starts with it are portals, in capitals or not [window]
+  --camera X,Y,Z,X,Y,Z    where to look from and what at, with 60 degrees from bottom to top [the file's own]
+  --panes PREFIX          materials whose name starts with it are clear panes, whatever the file says
   --env FILE              latitude-longitude environment, .hdr or .exr, or `none` [a clear sky with a sun]
-  --bounces N             surfaces that light may touch on its way [5]
+  --bounces N,...         surfaces that light may touch on its way; a table for each number [5]
 ";
 
 /// What is to be done.
@@ -46,12 +50,15 @@ pub(crate) struct Arguments {
     pub(crate) budget: Budget,
     pub(crate) size: Option<[u32; 2]>,
     pub(crate) seed: u32,
+    pub(crate) images: u32,
     pub(crate) output: Option<PathBuf>,
     pub(crate) exr: Option<PathBuf>,
     pub(crate) lists: bool,
     pub(crate) portal_prefix: String,
+    pub(crate) panes: Option<String>,
+    pub(crate) camera: Option<[Vec3; 2]>,
     pub(crate) environment: Option<PathBuf>,
-    pub(crate) bounces: u32,
+    pub(crate) bounces: Vec<u32>,
 }
 
 impl Arguments {
@@ -62,12 +69,15 @@ impl Arguments {
             budget: Budget::Seconds(5.0),
             size: None,
             seed: 1,
+            images: 1,
             output: None,
             exr: None,
             lists: false,
             portal_prefix: "window".to_owned(),
+            panes: None,
+            camera: None,
             environment: None,
-            bounces: 5,
+            bounces: vec![5],
         };
         let mut task = None;
         let mut parser = lexopt::Parser::from_env();
@@ -85,13 +95,16 @@ impl Arguments {
                 Long("seconds") => arguments.budget = Budget::Seconds(parser.value()?.parse_with(duration)?),
                 Long("spp") => arguments.budget = Budget::Samples(parser.value()?.parse_with(positive)?),
                 Long("size") => arguments.size = Some(parser.value()?.parse_with(size)?),
+                Long("images") => arguments.images = parser.value()?.parse_with(positive)?,
                 Long("seed") => arguments.seed = parser.value()?.parse()?,
                 Long("output") => arguments.output = Some(parser.value()?.into()),
                 Long("exr") => arguments.exr = Some(parser.value()?.into()),
                 Long("list") => arguments.lists = true,
                 Long("portal-prefix") => arguments.portal_prefix = parser.value()?.string()?,
+                Long("panes") => arguments.panes = Some(parser.value()?.string()?),
+                Long("camera") => arguments.camera = Some(parser.value()?.parse_with(two_points)?),
                 Long("env") => arguments.environment = Some(parser.value()?.into()),
-                Long("bounces") => arguments.bounces = parser.value()?.parse_with(positive)?,
+                Long("bounces") => arguments.bounces = parser.value()?.parse_with(numbers)?,
                 _ => return Err(argument.unexpected().into()),
             }
         }
@@ -102,6 +115,20 @@ impl Arguments {
 
 fn positive(number: &str) -> Result<u32, &'static str> {
     number.parse().ok().filter(|&number| number > 0).ok_or("not a whole number above zero")
+}
+
+fn two_points(list: &str) -> Result<[Vec3; 2], &'static str> {
+    let numbers: Vec<f32> = list.split(',').map_while(|number| number.trim().parse().ok()).collect();
+    match numbers[..] {
+        [a, b, c, d, e, f] if numbers.iter().all(|number| number.is_finite()) => {
+            Ok([Vec3::new(a, b, c), Vec3::new(d, e, f)])
+        }
+        _ => Err("not six numbers with commas between them"),
+    }
+}
+
+fn numbers(list: &str) -> Result<Vec<u32>, &'static str> {
+    list.split(',').map(positive).collect()
 }
 
 fn size(text: &str) -> Result<[u32; 2], &'static str> {

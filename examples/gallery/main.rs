@@ -19,7 +19,7 @@ use std::process::ExitCode;
 
 use arguments::{Arguments, Task};
 use image::RgbImage;
-use render::{Daylight, Error, Illumination, Image, Lights, Model, Sky, read_rgb, write_rgb};
+use render::{Camera, Daylight, Error, Illumination, Image, Lights, Model, Sky, read_rgb, write_rgb};
 use report::{Comparison, Effort, Picture};
 use scenes::Scene;
 
@@ -52,7 +52,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
 }
 
 fn effort(arguments: &Arguments) -> Effort {
-    Effort { budget: arguments.budget, seed: arguments.seed }
+    Effort { budget: arguments.budget, seed: arguments.seed, images: arguments.images }
 }
 
 /// Renders a built-in scene, and writes its picture. Returns the two images of it.
@@ -69,10 +69,14 @@ fn render_file(path: &Path, arguments: &Arguments) -> Result<(), Error> {
         Some(path) => Some(Sky::new(read_rgb(path)?)),
         None => Some(Daylight::new().draw()),
     };
-    let read =
-        || gltf::read(&std::fs::read(path)?, path.parent(), &arguments.portal_prefix, sky, gltf::Limits::RENDERABLE);
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let prefixes = gltf::Prefixes { portals: &arguments.portal_prefix, panes: arguments.panes.as_deref() };
+    let read = || gltf::read(&std::fs::read(path)?, path.parent(), prefixes, sky, gltf::Limits::RENDERABLE);
     let gltf::Read { mut model, notes, contents } =
         read().map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    if let Some([from, to]) = arguments.camera {
+        model.camera = Camera::looking(from, to, 60.0);
+    }
     for note in notes {
         eprintln!("note: {note}");
     }
@@ -87,7 +91,7 @@ fn render_file(path: &Path, arguments: &Arguments) -> Result<(), Error> {
         return Ok(());
     }
     resize(&mut model, arguments);
-    let comparison = studies::without_and_with("file", &model, &[arguments.bounces], effort(arguments))?;
+    let comparison = studies::without_and_with(&name, &model, &arguments.bounces, effort(arguments))?;
     let picture = arguments.output.clone().unwrap_or_else(|| path.with_extension("png"));
     write(&comparison, [0.5, 0.5], &picture, arguments).map(drop)
 }
@@ -98,16 +102,16 @@ fn resize(model: &mut Model, arguments: &Arguments) {
     }
 }
 
-/// Writes what a comparison came to: the first image next to the last one.
+/// Writes what a comparison came to: the image of the best competitor next to that with `fanlight`.
 fn write(
     comparison: &Comparison,
     detail: [f32; 2],
     path: &Path,
     arguments: &Arguments,
 ) -> Result<[RgbImage; 2], Error> {
-    let Comparison { images, reference, seen } = comparison;
-    let [Some(first), Some(last)] = [images.first(), images.last()] else { return Err("nothing was rendered".into()) };
-    let [first, last, best] = [first, last, reference.image()].map(|image| sum(image, seen));
+    let Comparison { images, shown, reference, seen } = comparison;
+    let [Some(without), Some(with)] = shown.map(|i| images.get(i)) else { return Err("nothing was rendered".into()) };
+    let [first, last, best] = [without, with, reference.image()].map(|image| sum(image, seen));
     let picture = Picture::exposed_by(reference.image());
     report::save(&picture.pair([&first, &last], &best, detail), path)?;
     if let Some(path) = &arguments.exr {

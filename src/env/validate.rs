@@ -28,7 +28,7 @@ impl<'a> EnvironmentView<'a> {
     /// If a section is missing or does not hold what it should.
     pub(crate) fn from_all_sections(sections: &mut Sections<'a>) -> Result<Self, Error> {
         let header = sections.take_value(HEADER.0, HEADER.1, "header of the environment")?;
-        let environment = Self::from_sections(sections, header)?;
+        let environment = Self::from_sections(sections, (header,))?;
         environment.validate()?;
         Ok(environment)
     }

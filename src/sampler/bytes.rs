@@ -114,17 +114,11 @@ impl<'a> LightSamplerView<'a> {
         if !(0.0..f32::INFINITY).contains(&energy) {
             return Err(Error::bytes("energy", 0, energy.to_bits(), 0u64));
         }
-        let tlas = TlasView::from_sections(&mut sections, arity)?;
-        let lights = LightsView::from_sections(
-            &mut sections,
-            illumination,
-            energy,
-            has_portals != 0,
-            has_lamps != 0,
-            is_crossed_once != 0,
-            0.0,
-            false,
-        )?;
+        let tlas = TlasView::from_sections(&mut sections, (arity,))?;
+        let (has_portals, has_lamps, is_crossed_once) = (has_portals != 0, has_lamps != 0, is_crossed_once != 0);
+        // The time of whoever asks, and no places left free by edits.
+        let plain = (illumination, energy, has_portals, has_lamps, is_crossed_once, 0.0, false);
+        let lights = LightsView::from_sections(&mut sections, plain)?;
         let environment = EnvironmentView::from_all_sections(&mut sections)?;
         let sky = if has_sky == 0 { None } else { Some(take_regions(&mut sections)?) };
         sections.end()?;

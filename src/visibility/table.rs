@@ -178,7 +178,7 @@ impl<'a> VisibilityView<'a> {
         let mut sections = Sections::new(bytes)?;
         let header =
             sections.take_value(VisibilityHeader::TAG, VisibilityHeader::VERSION, "parameters of visibility")?;
-        let view = Self::from_sections(&mut sections, header)?;
+        let view = Self::from_sections(&mut sections, (header,))?;
         sections.end()?;
         view.validate()?;
         Ok(view)

@@ -33,5 +33,5 @@ mod triangles;
 mod write;
 
 pub(crate) use data::Limits;
-pub(crate) use read::{Read, read};
+pub(crate) use read::{Prefixes, Read, read};
 pub(crate) use write::write;

@@ -17,7 +17,7 @@ use super::primitive::{self, Wanted};
 use super::surface::{Map, Reading, Surface};
 use super::texture::Mapping;
 use super::{container, extensions, lamps, profiles, skin};
-use crate::render::{Camera, Copies, Error, Material, Mesh, Model, Sky};
+use crate::render::{Camera, Copies, Error, Lobe, Material, Mesh, Model, Sky};
 
 /// Longest side of a scene: what is further than a thousand kilometers is a mistake in its units.
 const LARGEST: f32 = 1e6;
@@ -33,12 +33,27 @@ pub(crate) struct Read {
     pub(crate) contents: Vec<String>,
 }
 
+/// What materials are by their names, in capitals or not.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Prefixes<'a> {
+    /// Those whose names start with this are portals, if they let light through.
+    pub(crate) portals: &'a str,
+    /// And those whose names start with this do so, as clear panes, whatever the file says.
+    pub(crate) panes: Option<&'a str>,
+}
+
+impl<'a> From<&'a str> for Prefixes<'a> {
+    fn from(portals: &'a str) -> Self {
+        Self { portals, panes: None }
+    }
+}
+
 /// Reads a scene from the bytes of a file, and from others in its folder, if there is one. Its environment is not in the
 /// file.
-pub(crate) fn read(
+pub(crate) fn read<'a>(
     bytes: &[u8],
     folder: Option<&Path>,
-    portal_prefix: &str,
+    prefixes: impl Into<Prefixes<'a>>,
     sky: Option<Sky>,
     limits: Limits,
 ) -> Result<Read, Error> {
@@ -48,9 +63,11 @@ pub(crate) fn read(
     let hierarchy = Hierarchy::new(&document, &mut notes)?;
     let camera = Camera::looking(Vec3::ONE, Vec3::ZERO, 60.0);
     let mut model = Model::new(camera, sky);
-    portal_prefix.clone_into(&mut model.portal_prefix);
+    let Prefixes { portals, panes } = prefixes.into();
+    portals.clone_into(&mut model.portal_prefix);
     let uses = (0..=document.materials.len()).map(|_| Uses::default()).collect();
     let mut reader = Reader {
+        panes,
         data: Data::new(&document, folder, blob, limits),
         document: &document,
         hierarchy,
@@ -73,6 +90,8 @@ type Mappings = [Option<Mapping>; 2];
 
 struct Reader<'a> {
     document: &'a Document,
+    /// What names of materials start with that are clear panes.
+    panes: Option<&'a str>,
     data: Data<'a>,
     hierarchy: Hierarchy,
     images: Images,
@@ -96,6 +115,7 @@ impl Reader<'_> {
             self.add_node(index).map_err(|error| format!("{}: {error}", self.document.node(index)))?;
         }
         let [low, high] = self.check()?;
+        self.contents.push(format!("the scene reaches from {low} to {high}"));
         self.place_camera(low, high)?;
         self.add_lamps()?;
         self.conclude();
@@ -192,6 +212,9 @@ impl Reader<'_> {
             read.map_err(|error| format!("{called}: {error}"))?
         };
         let mut material = surface.material;
+        if self.panes.is_some_and(|prefix| starts_with(&material.name, prefix)) {
+            (material.lobe, material.two_sided) = (Lobe::Clear, true);
+        }
         material.color_map = surface.color_map.map(|map| self.bitmap(map));
         material.emission_map = surface.emission_map.map(|map| self.bitmap(map));
         let mappings = [surface.color_mapping, surface.emission_mapping];
@@ -250,7 +273,10 @@ impl Reader<'_> {
         let cameras = self.hierarchy.visible.iter().filter_map(|&node| Some((node, nodes[node].camera?)));
         let cameras: Vec<_> = cameras.collect();
         let Some(&(node, index)) = cameras.first() else {
-            self.notes.add("the scene has no camera; looking from a corner of the scene to its middle".to_owned());
+            self.notes.add(
+                "the scene has no camera; looking from a corner of it to its middle (`--camera` sets another one)"
+                    .to_owned(),
+            );
             self.model.camera = Camera::looking(low.lerp(high, 0.95), low.lerp(high, 0.45), 60.0);
             self.contents.push("camera: none".to_owned());
             return Ok(());
@@ -322,7 +348,7 @@ impl Reader<'_> {
             let prefix = &self.model.portal_prefix;
             self.notes.add(format!(
                 "there are no lamps, no material emits light, and none that lets light through has a name that starts with `{prefix}`: \
-                 there is nothing to gain"
+                 all light is the environment's"
             ));
         }
     }

@@ -26,11 +26,21 @@ pub(crate) struct Proposal {
     pub(crate) direction: Vec3,
     /// The direction's density per solid angle, over all ways in which the same sampler could have chosen it.
     pub(crate) pdf: f32,
-    /// How far away the point is that alone the density is for; `None` if it is for all along the direction.
-    pub(crate) distance: Option<f32>,
-    /// Number of the lamp that was chosen, if it is one. No ray finds it by chance, and the density is the probability of
-    /// that choice.
-    pub(crate) lamp: Option<usize>,
+    /// What the density is for.
+    pub(crate) aim: Aim,
+}
+
+/// What a direction was proposed for: nothing else that arrives from there counts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Aim {
+    /// Whatever arrives.
+    Any,
+    /// The sky, with what is as far away.
+    Sky,
+    /// The emitter's point at this distance.
+    Point(f32),
+    /// The lamp of this number. No ray finds it by chance, and the density is the probability of its choice.
+    Lamp(usize),
 }
 
 /// The emitters, and the sky with the portals that it is seen through.
@@ -38,6 +48,10 @@ pub(crate) struct Lights {
     sampler: LightSampler,
     sources: Sources,
     passed: Passed,
+    /// Whether a hit of an emitter tells which point of which light it is, and rays to the sky cross no emitter.
+    knows_hits: bool,
+    /// Whether the sky is one of the lights, and all that rays find which leave the scene.
+    open_sky: bool,
 }
 
 impl Lights {
@@ -51,6 +65,22 @@ impl Lights {
         model: &Model,
         illumination: Illumination,
         factor: impl Fn(usize) -> f32,
+    ) -> Result<Self, Error> {
+        Self::build(model, illumination, factor, false)
+    }
+
+    /// The same with the sky as one more light where no portal leads to it.
+    pub(crate) fn plain(model: &Model) -> Result<Self, Error> {
+        let is_portal = |mesh: &super::mesh::Mesh| model.is_portal(mesh) && model.materials[mesh.material].has_holes();
+        let open_sky = model.sky.is_some() && !model.meshes.iter().any(is_portal);
+        Self::build(model, Illumination::default(), |_| 1.0, open_sky)
+    }
+
+    fn build(
+        model: &Model,
+        illumination: Illumination,
+        factor: impl Fn(usize) -> f32,
+        open_sky: bool,
     ) -> Result<Self, Error> {
         let material = |mesh: &super::mesh::Mesh| &model.materials[mesh.material];
         let firsts =
@@ -70,6 +100,15 @@ impl Lights {
         };
         let transmission: Vec<_> = portals.iter().enumerate().map(factor_of).collect();
         let mut builder = LightSampler::builder().illumination(illumination).environment(environment(model)?);
+        if open_sky {
+            builder = builder.environment_as_light();
+        }
+        let has_caps = model.lamps.iter().any(|lamp| lamp.cap().is_some());
+        let open_sky = open_sky && !has_caps;
+        // Rays that leave through an emitter's hole have a density along all of their way.
+        let counts_holes = !open_sky && (has_caps || model.sky.is_some());
+        let is_vague = |mesh: &super::mesh::Mesh| mesh.bulb.is_some() || counts_holes && material(mesh).has_holes();
+        let knows_hits = !emitters.iter().any(|(mesh, _)| is_vague(mesh));
         // Their numbers are those of the model.
         let mut profiles = BTreeMap::new();
         for lamp in &model.lamps {
@@ -96,7 +135,7 @@ impl Lights {
             })?;
         }
         let (sources, passed) = meshes.finish();
-        Ok(Self { sources, passed, sampler: builder.build()? })
+        Ok(Self { sources, passed, knows_hits, open_sky, sampler: builder.build()? })
     }
 
     /// What was passed in, and the memory that it takes.
@@ -121,7 +160,7 @@ impl Lights {
     /// A direction to the sky, bright parts more often than dark ones.
     pub(crate) fn sample_environment(&self, u: [f32; 2]) -> Option<Proposal> {
         let sample = self.sampler.environment().sample(u)?;
-        Some(Proposal { direction: sample.direction, pdf: sample.pdf, distance: None, lamp: None })
+        Some(Proposal { direction: sample.direction, pdf: sample.pdf, aim: Aim::Sky })
     }
 
     /// Density per solid angle of a direction under [`sample_environment`](Self::sample_environment).
@@ -173,6 +212,13 @@ impl Lights {
 /// The lights as seen from one point.
 pub(crate) struct LightsAt<'a>(PointSampler<'a>);
 
+impl<'a> LightsAt<'a> {
+    /// The same with samples that stand for one light each.
+    pub(crate) fn by_light(self, lights: &'a Lights) -> PlainAt<'a> {
+        PlainAt { here: self.0, lights }
+    }
+}
+
 impl LightsAt<'_> {
     /// A direction to a light, by what comes from there and counts at the point.
     pub(crate) fn sample(&self, u: [f32; 3]) -> Option<Proposal> {
@@ -192,12 +238,47 @@ impl LightsAt<'_> {
     }
 }
 
+/// The same, where a sample stands for the point of the emitter that was drawn, or for the sky.
+pub(crate) struct PlainAt<'a> {
+    here: PointSampler<'a>,
+    lights: &'a Lights,
+}
+
+impl PlainAt<'_> {
+    /// A direction to a light, by what comes from there and counts at the point.
+    pub(crate) fn sample(&self, u: [f32; 3]) -> Option<Proposal> {
+        let sample = self.here.sample(u)?;
+        let Lights { sources, knows_hits, open_sky, .. } = self.lights;
+        Some(match sample.light {
+            SampledLight::Punctual(_) => proposal(&sample, sample.pdf),
+            _ if !knows_hits => proposal(&sample, self.here.pdf_sample_direction(&sample)),
+            SampledLight::Triangle(hit) if sources.emits(&hit) => {
+                Proposal { aim: Aim::Point(sample.distance), ..proposal(&sample, sample.pdf) }
+            }
+            SampledLight::Environment if *open_sky => Proposal { aim: Aim::Sky, ..proposal(&sample, sample.pdf) },
+            _ => Proposal { aim: Aim::Sky, ..proposal(&sample, self.here.pdf_sample_direction(&sample)) },
+        })
+    }
+
+    /// Density per solid angle of a direction under [`sample`](Self::sample), which leads to an emitter's point, or to
+    /// the sky if that is `None`.
+    pub(crate) fn pdf(&self, direction: Vec3, from: Option<&Point>) -> f32 {
+        match from {
+            Some(point) if self.lights.knows_hits => {
+                self.lights.sources.hit(point).map_or(0.0, |hit| self.here.pdf(&hit))
+            }
+            None if self.lights.knows_hits && self.lights.open_sky => self.here.pdf_environment(direction),
+            _ => self.here.pdf_direction(direction),
+        }
+    }
+}
+
 fn proposal(sample: &LightSample, pdf: f32) -> Proposal {
-    let lamp = match sample.light {
-        SampledLight::Punctual(id) => Some(id.index() as usize),
-        _ => None,
+    let aim = match sample.light {
+        SampledLight::Punctual(id) => Aim::Lamp(id.index() as usize),
+        _ => Aim::Any,
     };
-    Proposal { direction: sample.direction, pdf, distance: None, lamp }
+    Proposal { direction: sample.direction, pdf, aim }
 }
 
 /// A ray of light.

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::lighting::Proposal;
+use super::lighting::{Aim, Proposal};
 use super::photon::{Photon, PhotonTracer};
 pub(crate) use super::random::Random;
 use super::scene::Point;
@@ -100,8 +100,7 @@ impl<'a> PathTracer<'a> {
     /// Direct light by one direction of each light sampler.
     fn by_light_samples(&self, x: &Vertex<'_>, random: &mut Random) -> Vec3 {
         let mut radiance = Vec3::ZERO;
-        if self.world.has_sky()
-            && !matches!(x.lights, ChoiceAt::Single(_))
+        if self.samples_environment()
             && let Some(proposal) = self.techniques.lights.sample_environment(random.take())
         {
             radiance += self.along(x, &proposal, true);
@@ -114,25 +113,26 @@ impl<'a> PathTracer<'a> {
 
     /// Direct light along a direction that the environment or the lights proposed.
     fn along(&self, x: &Vertex<'_>, proposal: &Proposal, by_environment: bool) -> Vec3 {
-        let &Proposal { direction, pdf, distance, lamp } = proposal;
+        let &Proposal { direction, pdf, aim } = proposal;
         let value = x.value(direction);
         if value == Vec3::ZERO {
             return value;
         }
         let start = x.start(direction);
-        if let Some(lamp) = lamp {
-            return value * self.world.arriving_from_lamp(lamp, start) / pdf;
-        }
-        let arrival = if by_environment {
-            self.world.arriving_from_sky(start, direction)
-        } else {
-            self.world.arriving(start, direction)
+        let arrival = match aim {
+            Aim::Lamp(lamp) => return value * self.world.arriving_from_lamp(lamp, start) / pdf,
+            Aim::Sky => self.world.arriving_from_sky(start, direction),
+            Aim::Any | Aim::Point(_) => self.world.arriving(start, direction),
         };
-        // Another point of an emitter may be in front of the one that was drawn.
-        let hidden = distance.zip(arrival.from).is_some_and(|(drawn, met)| {
-            (x.position() + drawn * direction).distance(met.position) > SAME * self.world.scene.offset()
-        });
-        if arrival.radiance == Vec3::ZERO || hidden {
+        // Another point of an emitter may be in front of the one that was drawn, or the ray may miss that one.
+        let other = match (aim, arrival.from) {
+            (Aim::Point(drawn), Some(met)) => {
+                (x.position() + drawn * direction).distance(met.position) > SAME * self.world.scene.offset()
+            }
+            (Aim::Point(_), None) => true,
+            _ => false,
+        };
+        if arrival.radiance == Vec3::ZERO || other {
             return Vec3::ZERO;
         }
         let lights_pdf = (!by_environment).then_some(pdf);
@@ -175,6 +175,11 @@ impl<'a> PathTracer<'a> {
         value * passed * geometry * reflected * photon.radiance / (photon.pdf + by_path)
     }
 
+    /// Whether directions to the bright parts of the sky are a technique of their own.
+    fn samples_environment(&self) -> bool {
+        self.techniques.environment && self.world.has_sky()
+    }
+
     /// Density per solid angle with which all techniques together find the light from a direction: that of an
     /// emitter's point, or that of the sky. `lights_pdf` is the light sampler's part of it, if it is known.
     fn density(&self, x: &Vertex<'_>, direction: Vec3, from: Option<&Point>, lights_pdf: Option<f32>) -> f32 {
@@ -183,7 +188,7 @@ impl<'a> PathTracer<'a> {
             return lights_pdf;
         }
         let environment_pdf = match from {
-            None if self.world.has_sky() => self.techniques.lights.environment_pdf(direction),
+            None if self.samples_environment() => self.techniques.lights.environment_pdf(direction),
             _ => 0.0,
         };
         let photon_pdf = match (&self.photons, x.arrival, &x.place) {

@@ -5,7 +5,7 @@ use core::f32::consts::{PI, TAU};
 use glam::Vec3;
 
 use super::lamp::{Lamp, within};
-use super::lighting::Proposal;
+use super::lighting::{Aim, Proposal};
 use super::model::Model;
 use super::scene::Point;
 use super::sky::LUMINANCE;
@@ -54,10 +54,10 @@ impl PowerTable {
         let (direction, _) = self.lamps.get(lamp)?.towards(position);
         if let Some((cosine, _)) = self.lamps[lamp].cap() {
             let pdf = share / (TAU * (1.0 - cosine));
-            return Some(Proposal { direction: within(direction, cosine, [u, v]), pdf, distance: None, lamp: None });
+            return Some(Proposal { direction: within(direction, cosine, [u, v]), pdf, aim: Aim::Sky });
         }
         // Not from the lamp's own place.
-        direction.is_finite().then_some(Proposal { direction, pdf: share, distance: None, lamp: Some(lamp) })
+        direction.is_finite().then_some(Proposal { direction, pdf: share, aim: Aim::Lamp(lamp) })
     }
 
     /// Density per solid angle of a direction that leads to a point of an emitter, or out of the scene if that is `None`.

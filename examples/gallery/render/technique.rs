@@ -4,7 +4,7 @@ use fanlight::ShadingPoint;
 
 use super::Error;
 use super::bsdf::Bsdf;
-use super::lighting::{Guide, Illumination, Lights, LightsAt, Proposal};
+use super::lighting::{Guide, Illumination, Lights, LightsAt, PlainAt, Proposal};
 use super::model::Model;
 use super::power_table::PowerTable;
 use super::published::Published;
@@ -15,9 +15,11 @@ use super::texel_table::TexelTable;
 pub(crate) enum LightChoice {
     /// Not at all.
     None,
-    /// By what they send to the shading point.
+    /// By what they send to the shading point. A direction stands for all that arrives along it.
     Fanlight,
-    /// The same, and each sample with the density of the one point that was drawn. Wrong where a ray crosses
+    /// The same, and a sample stands for the point of the emitter that was drawn, or for the sky.
+    Plain,
+    /// By what they send, and each sample with the density of the one point that was drawn. Wrong where a ray crosses
     /// several portals.
     Single,
     /// From one table for the whole scene, emitters only.
@@ -33,6 +35,8 @@ pub(crate) struct Techniques {
     pub(crate) lights: Lights,
     guide: Option<Guide>,
     pub(crate) choice: LightChoice,
+    /// Whether directions to the bright parts of the sky are a technique of their own.
+    pub(crate) environment: bool,
     /// At how many vertices of a path points on lights are chosen.
     pub(crate) vertices: u32,
     /// Whether one ray of light is traced for each path, for the path's vertices to connect to.
@@ -40,6 +44,11 @@ pub(crate) struct Techniques {
 }
 
 impl Techniques {
+    /// What a path tracer has that knows no lights at all: directions from the surfaces.
+    pub(crate) fn surfaces(model: &Model) -> Result<Self, Error> {
+        Ok(Self { environment: false, choice: LightChoice::None, ..Self::without(model)? })
+    }
+
     /// What a path tracer has that knows no portals: the sky's bright parts, emitters by area and radiance, and lamps by
     /// power.
     pub(crate) fn without(model: &Model) -> Result<Self, Error> {
@@ -50,17 +59,26 @@ impl Techniques {
             PowerTable::new(model).map_or(LightChoice::None, LightChoice::Power)
         };
         let lights = Lights::new(model, Illumination::default())?;
-        Ok(Self { lights, guide: None, choice, vertices: u32::MAX, photons: false })
+        Ok(Self { lights, guide: None, choice, environment: true, vertices: u32::MAX, photons: false })
     }
 
-    /// The same with `fanlight`: at the point that the camera sees by choosing points on lights, at those behind it
-    /// by rays of light that are traced from where they start. Lamps are chosen at all points, as no ray is traced from them.
-    pub(crate) fn with(model: &Model) -> Result<Self, Error> {
+    /// The same path tracer with one sample of `fanlight` at each vertex in place of these: of all lights, and of the sky
+    /// through its portals or, where there are none, as one more light.
+    pub(crate) fn plain(model: &Model) -> Result<Self, Error> {
+        let lights = Lights::plain(model)?;
+        let choice = LightChoice::Plain;
+        Ok(Self { lights, guide: None, choice, environment: false, vertices: u32::MAX, photons: false })
+    }
+
+    /// All that this renderer has: at the point that the camera sees points on lights and the sky's bright parts, at those
+    /// behind it rays of light that are traced from where they start. Lamps are chosen at all points, as no ray is traced
+    /// from them.
+    pub(crate) fn with_light_rays(model: &Model) -> Result<Self, Error> {
         let lights = Lights::new(model, Illumination::default())?;
         let guide = Guide::new(model)?;
         let photons = lights.have_surfaces();
-        let vertices = if model.lamps.is_empty() { 1 } else { u32::MAX };
-        Ok(Self { lights, guide, choice: LightChoice::Fanlight, vertices, photons })
+        let vertices = if photons && model.lamps.is_empty() { 1 } else { u32::MAX };
+        Ok(Self { lights, guide, choice: LightChoice::Fanlight, environment: true, vertices, photons })
     }
 
     /// The same with another way to choose points on lights.
@@ -79,6 +97,7 @@ impl Techniques {
             LightChoice::Fanlight if vertex <= self.vertices => {
                 ChoiceAt::Fanlight(self.lights.at_surface(point.position, bsdf))
             }
+            LightChoice::Plain => ChoiceAt::Plain(self.lights.at_surface(point.position, bsdf).by_light(&self.lights)),
             LightChoice::Single => ChoiceAt::Single(self.lights.at_surface(point.position, bsdf)),
             LightChoice::Table(table) => ChoiceAt::Table(table, point.position),
             LightChoice::Power(table) => ChoiceAt::Power(table, point.position),
@@ -93,6 +112,7 @@ impl Techniques {
     pub(crate) fn lights_in_fog(&self, position: glam::Vec3) -> ChoiceAt<'_> {
         match &self.choice {
             LightChoice::Fanlight => ChoiceAt::Fanlight(self.lights.at_volume(position)),
+            LightChoice::Plain => ChoiceAt::Plain(self.lights.at_volume(position).by_light(&self.lights)),
             LightChoice::Table(table) => ChoiceAt::Table(table, position),
             LightChoice::Power(table) => ChoiceAt::Power(table, position),
             _ => ChoiceAt::None,
@@ -110,7 +130,9 @@ impl Techniques {
         u: f32,
     ) -> Option<(f32, f32)> {
         match &self.choice {
-            LightChoice::Fanlight => self.lights.propose_distance(origin, direction, length, density, u),
+            LightChoice::Fanlight | LightChoice::Plain => {
+                self.lights.propose_distance(origin, direction, length, density, u)
+            }
             _ => None,
         }
     }
@@ -125,6 +147,7 @@ impl Techniques {
 pub(crate) enum ChoiceAt<'a> {
     None,
     Fanlight(LightsAt<'a>),
+    Plain(PlainAt<'a>),
     Single(LightsAt<'a>),
     Table(&'a TexelTable, glam::Vec3),
     Power(&'a PowerTable, glam::Vec3),
@@ -137,6 +160,7 @@ impl ChoiceAt<'_> {
         match self {
             Self::None => None,
             Self::Fanlight(lights) => lights.sample(u),
+            Self::Plain(lights) => lights.sample(u),
             Self::Single(lights) => lights.sample_single(u),
             Self::Table(table, position) => table.sample(*position, u),
             Self::Power(table, position) => table.sample(*position, u),
@@ -150,6 +174,7 @@ impl ChoiceAt<'_> {
         match self {
             Self::None | Self::Single(_) => 0.0,
             Self::Fanlight(lights) => lights.pdf(direction),
+            Self::Plain(lights) => lights.pdf(direction, from),
             Self::Power(table, _) => table.pdf(direction, from),
             Self::Table(table, _) => from.map_or(0.0, |point| table.pdf(direction, point)),
             Self::Published(lights, x) => from.map_or(0.0, |point| lights.pdf(x, direction, point)),

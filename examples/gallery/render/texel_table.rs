@@ -8,7 +8,7 @@ use super::alloc::sync::Arc;
 use glam::{Vec2, Vec3, vec2};
 use smallvec::{SmallVec, smallvec};
 
-use super::lighting::Proposal;
+use super::lighting::{Aim, Proposal};
 use super::model::Model;
 use super::scene::Point;
 use super::sky::LUMINANCE;
@@ -112,12 +112,7 @@ impl TexelTable {
         let distance2 = step.length_squared();
         let direction = step / distance2.sqrt();
         let pdf = pdf_area as f32 * distance2 / normal.dot(direction).abs();
-        (pdf.is_finite() && pdf > 0.0).then_some(Proposal {
-            direction,
-            pdf,
-            distance: Some(distance2.sqrt()),
-            lamp: None,
-        })
+        (pdf.is_finite() && pdf > 0.0).then_some(Proposal { direction, pdf, aim: Aim::Point(distance2.sqrt()) })
     }
 
     /// Density per solid angle of a direction that leads to a point of an emitter.

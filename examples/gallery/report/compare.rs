@@ -1,12 +1,13 @@
 //! Renders a scene by several sets of techniques in the same time.
 
-use super::table::{self, Row};
+use super::clock;
+use super::statistics::{Logarithms, geometric_mean};
 use super::with_progress_bar;
 use crate::render::{Budget, Camera, Error, Film, Image, PathTracer, Progressive, Reference, Techniques, World};
 
 /// Samples a pixel for what is seen without being scattered.
 const SEEN: Budget = Budget::Samples(16);
-/// How many times as long as an image its reference is rendered.
+/// How many times as long as all images of a contestant their reference is rendered. *Chosen.*
 const REFERENCE_FACTOR: u32 = 4;
 
 /// How much is rendered.
@@ -15,11 +16,25 @@ pub(crate) struct Effort {
     /// Of each image.
     pub(crate) budget: Budget,
     pub(crate) seed: u32,
+    /// How many images of each contestant are rendered, with other random numbers each.
+    pub(crate) images: u32,
+}
+
+/// What a set of techniques is compared as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Without `fanlight`: the best of these is what others are measured by.
+    Competitor,
+    /// With `fanlight`: the last of these is what the scene's figure is about.
+    Fanlight,
+    /// More than a plain path tracer does.
+    Extra,
 }
 
 /// One of the sets of techniques that are compared.
 pub(crate) struct Contestant {
     pub(crate) name: String,
+    pub(crate) role: Role,
     pub(crate) techniques: Techniques,
 }
 
@@ -27,6 +42,8 @@ pub(crate) struct Contestant {
 pub(crate) struct Comparison {
     /// One of each contestant.
     pub(crate) images: Vec<Image>,
+    /// The best competitor, and the last one with `fanlight`.
+    pub(crate) shown: [usize; 2],
     pub(crate) reference: Reference,
     /// Lights and sky as the camera sees them. No technique has to do with these, so that they are in no error.
     pub(crate) seen: Image,
@@ -42,21 +59,99 @@ pub(crate) fn compare(
     contestants: &[Contestant],
     effort: Effort,
 ) -> Result<Comparison, Error> {
-    let render = |Contestant { name, techniques }: &Contestant, seed: u32, budget: Budget| {
-        let tracer = PathTracer::new(world, techniques, bounces);
-        let progressive = Progressive { tracer, camera, seed };
-        with_progress_bar(name, |progress| progressive.render(budget, progress))
-    };
-    let films: Vec<(Film, f64)> = contestants.iter().map(|c| render(c, effort.seed, effort.budget)).collect();
     let best = contestants.last().ok_or("nothing to compare")?;
-    let reference = Reference::from_film(&render(best, !effort.seed, effort.budget.times(REFERENCE_FACTOR)).0);
+    let runs: Vec<Vec<Run>> = (0..effort.images)
+        .map(|i| {
+            let seed = effort.seed.wrapping_add(i);
+            let tracers: Vec<_> = (contestants.iter())
+                .map(|Contestant { techniques, .. }| PathTracer::new(world, techniques, bounces))
+                .map(|tracer| Progressive { tracer, camera, seed })
+                .collect();
+            with_progress_bar(title, |progress| take_turns(&tracers, effort.budget, progress))
+        })
+        .collect();
+    let budget = effort.budget.times(REFERENCE_FACTOR * effort.images);
+    let tracer = PathTracer::new(world, &best.techniques, bounces);
+    let progressive = [Progressive { tracer, camera, seed: !effort.seed }];
+    let reference = with_progress_bar("reference", |progress| take_turns(&progressive, budget, progress));
+    let reference = Reference::from_film(&reference.first().ok_or("nothing to compare")?.film);
     let tracer = PathTracer::new(world, &best.techniques, 0);
     let seen = Progressive { tracer, camera, seed: effort.seed }.render(SEEN, drop).0.image();
 
     println!("\n{title}");
-    let rows: Vec<_> = (contestants.iter().zip(&films))
-        .map(|(Contestant { name, .. }, (film, seconds))| Row { name, film, seconds: *seconds })
-        .collect();
-    table::print(&rows, &reference)?;
-    Ok(Comparison { images: films.iter().map(|(film, _)| film.image()).collect(), reference, seen })
+    let shown = print(contestants, &runs, &reference);
+    let images = runs.first().map_or_else(Vec::new, |runs| runs.iter().map(|run| run.film.image()).collect());
+    Ok(Comparison { images, shown, reference, seen })
+}
+
+/// One image, and the seconds that it took.
+struct Run {
+    film: Film,
+    seconds: f64,
+}
+
+impl Run {
+    /// Relative mean squared error. What is left of it after the reference's own noise is subtracted may be less than
+    /// nothing: then it is known to be small, and no more.
+    fn error(&self, reference: &Reference) -> f64 {
+        const LEAST: f64 = 0.05;
+        reference.rel_mse(&self.film.image()).max(LEAST * reference.noise()).max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Renders all images at the same time, a sample a pixel of each in turn, so that a machine whose speed changes treats
+/// all alike.
+fn take_turns(tracers: &[Progressive<'_>], budget: Budget, progress: &dyn Fn(f64)) -> Vec<Run> {
+    let empty =
+        |tracer: &Progressive<'_>| Run { film: Film::new(tracer.camera.width(), tracer.camera.height()), seconds: 0.0 };
+    let mut runs: Vec<_> = tracers.iter().map(empty).collect();
+    loop {
+        let spent = |run: &Run| budget.spent(run.seconds, run.film.samples()).min(1.0);
+        progress(runs.iter().map(spent).sum::<f64>() / runs.len().max(1) as f64);
+        let mut is_done = true;
+        for (tracer, run) in tracers.iter().zip(&mut runs) {
+            if spent(run) < 1.0 {
+                let start = clock::seconds();
+                tracer.add_pass(&mut run.film);
+                run.seconds += clock::seconds() - start;
+                is_done = false;
+            }
+        }
+        if is_done {
+            return runs;
+        }
+    }
+}
+
+/// Prints the errors, and what each contestant gains over the best competitor. Returns that competitor and the last
+/// contestant with `fanlight`.
+fn print(contestants: &[Contestant], runs: &[Vec<Run>], reference: &Reference) -> [usize; 2] {
+    let costs = |i: usize| runs.iter().map(move |runs| runs[i].error(reference) * runs[i].seconds);
+    let competitors = (0..contestants.len()).filter(|&i| contestants[i].role == Role::Competitor);
+    let best = competitors.min_by(|&a, &b| geometric_mean(costs(a)).total_cmp(&geometric_mean(costs(b)))).unwrap_or(0);
+    let last = contestants.iter().rposition(|contestant| contestant.role == Role::Fanlight).unwrap_or(best);
+    let gain = |i: usize| Logarithms::new(costs(best).zip(costs(i)).map(|(best, cost)| best / cost));
+    println!(
+        "{:36} {:>8} {:>8} {:>10} {:>12} {:>8} {:>16}",
+        "", "spp", "seconds", "relMSE", "relMSE x s", "gain", "95 %"
+    );
+    for (i, Contestant { name, .. }) in contestants.iter().enumerate() {
+        let mean = |of: fn(&Run) -> f64| runs.iter().map(|runs| of(&runs[i])).sum::<f64>() / runs.len() as f64;
+        let (samples, seconds) = (mean(|run| f64::from(run.film.samples())), mean(|run| run.seconds));
+        let error = geometric_mean(runs.iter().map(|runs| runs[i].error(reference)));
+        let (cost, gain) = (geometric_mean(costs(i)), gain(i));
+        let interval = gain.interval().map_or_else(String::new, |[low, high]| format!("{low:.2} to {high:.2}"));
+        println!(
+            "{name:36} {samples:>8.0} {seconds:>8.2} {error:>10.3e} {cost:>12.3e} {:>8.2} {interval:>16}",
+            gain.mean()
+        );
+    }
+    if reference.noise() > 0.0 {
+        println!("The reference's own noise, relMSE {:.1e}, is subtracted.", reference.noise());
+    }
+    if contestants.iter().any(|contestant| contestant.role == Role::Fanlight) {
+        let [name, over] = [last, best].map(|i| &contestants[i].name);
+        println!("Efficiency of `{name}` over the best without fanlight, `{over}`: {:.2}", gain(last).mean());
+    }
+    [best, last]
 }

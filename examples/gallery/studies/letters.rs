@@ -72,7 +72,7 @@ fn study_source(name: &str, emitter: &Emitter<'_>, world: &World, seed: u32) -> 
         );
     }
     let seen = Image::black(CELLS[0], CELLS[1]);
-    Ok(Comparison { images: vec![unguided.image(), stratified.image()], reference, seen })
+    Ok(Comparison { images: vec![unguided.image(), stratified.image()], shown: [0, 1], reference, seen })
 }
 
 /// Squared error over the sum of squares: of the letters, and not of the dark around them.

@@ -8,7 +8,7 @@ mod nested;
 mod street;
 
 use crate::render::{Error, Model, Techniques, World};
-use crate::report::{Comparison, Contestant, Effort, compare};
+use crate::report::{Comparison, Contestant, Effort, Role, compare};
 use crate::scenes::Scene;
 
 /// Renders a scene without and with `fanlight`, and finds out what else there is to be found out in it.
@@ -23,7 +23,8 @@ pub(crate) fn study(scene: &Scene, model: &Model, effort: Effort) -> Result<Comp
     }
 }
 
-/// Renders a model without and with `fanlight`, for each number of bounces. Returns the last comparison.
+/// Renders a model without and with `fanlight` by the same plain path tracer, and by all that this renderer has, for each
+/// number of bounces. Returns the last comparison.
 pub(crate) fn without_and_with(
     name: &str,
     model: &Model,
@@ -31,8 +32,17 @@ pub(crate) fn without_and_with(
     effort: Effort,
 ) -> Result<Comparison, Error> {
     let world = World::new(model);
-    let contestants =
-        [contestant("without", Techniques::without(model)?), contestant("with fanlight", Techniques::with(model)?)];
+    let lights = if model.sky.is_some() { "sky and lights by power" } else { "lights by power" };
+    let mut contestants = vec![
+        contestant("surfaces alone", Role::Competitor, Techniques::surfaces(model)?),
+        contestant(lights, Role::Competitor, Techniques::without(model)?),
+        contestant("fanlight", Role::Fanlight, Techniques::plain(model)?),
+        contestant("fanlight, sky and rays of light", Role::Extra, Techniques::with_light_rays(model)?),
+    ];
+    // No ray finds these.
+    if !model.lamps.is_empty() {
+        contestants.remove(0);
+    }
     let mut last = Err("no number of bounces was asked for".into());
     for &bounces in bounces {
         let title = format!("{name}, {bounces} bounce{}", if bounces == 1 { "" } else { "s" });
@@ -41,6 +51,6 @@ pub(crate) fn without_and_with(
     last
 }
 
-fn contestant(name: &str, techniques: Techniques) -> Contestant {
-    Contestant { name: name.to_owned(), techniques }
+fn contestant(name: &str, role: Role, techniques: Techniques) -> Contestant {
+    Contestant { name: name.to_owned(), role, techniques }
 }

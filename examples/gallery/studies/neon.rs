@@ -4,28 +4,30 @@ use super::contestant;
 use crate::render::{
     Budget, Error, Illumination, LightChoice, Lights, Model, Published, Techniques, TexelTable, World,
 };
-use crate::report::{Comparison, Effort, compare};
+use crate::report::{Comparison, Effort, Role, compare};
 
 /// Samples a pixel where these are the same for all.
 const SAMPLES: Budget = Budget::Samples(16);
 
 pub(super) fn study(model: &Model, effort: Effort) -> Result<Comparison, Error> {
     let with = |illumination| -> Result<Techniques, Error> {
-        Ok(Techniques::with(model)?.with_lights(Lights::new(model, illumination)?))
+        Ok(Techniques::plain(model)?.with_lights(Lights::new(model, illumination)?))
     };
     let contestants = [
-        contestant("by area (without)", Techniques::without(model)?),
+        contestant("by area", Role::Competitor, Techniques::without(model)?),
         contestant(
             "by texel, one table",
+            Role::Extra,
             Techniques::without(model)?.choosing(LightChoice::Table(TexelTable::texels(model))),
         ),
-        contestant("boundary integration", with(Illumination::Boundary)?),
+        contestant("boundary integration", Role::Fanlight, with(Illumination::Boundary)?),
         contestant(
             "published method",
+            Role::Extra,
             Techniques::without(model)?.choosing(LightChoice::Published(Published::new(model))),
         ),
-        contestant("conservative term alone", with(Illumination::Conservative)?),
-        contestant("clamped vertices (default)", with(Illumination::default())?),
+        contestant("conservative term alone", Role::Fanlight, with(Illumination::Conservative)?),
+        contestant("clamped vertices (default)", Role::Fanlight, with(Illumination::default())?),
     ];
     let world = World::new(model);
     let samples = Effort { budget: SAMPLES, ..effort };

@@ -6,7 +6,7 @@
 
 use super::contestant;
 use crate::render::{Error, Illumination, LightChoice, Lights, Model, Random, Techniques, World};
-use crate::report::{Comparison, Effort, compare};
+use crate::report::{Comparison, Effort, Role, compare};
 
 /// Points, along each side of the image, from which it is counted what gets through.
 const PROBES: u16 = 64;
@@ -15,19 +15,27 @@ const LEAST: f32 = 1e-3;
 
 pub(super) fn study(model: &Model, effort: Effort) -> Result<Comparison, Error> {
     let flagged = |prefix: &str| -> Result<Techniques, Error> {
-        Techniques::with(&Model { portal_prefix: prefix.to_owned(), ..model.clone() })
+        Techniques::plain(&Model { portal_prefix: prefix.to_owned(), ..model.clone() })
     };
     let world = World::new(model);
     let shares = reaching(model, &world)?;
     println!("\nShare of the samples on the inner and on the outer portal that reach the sky: {shares:.4?}");
     let learned = Lights::weighted(model, Illumination::default(), |portal| shares[portal].max(LEAST))?;
     let contestants = [
-        contestant("without", Techniques::without(model)?),
-        contestant("both, single-hit density (wrong)", Techniques::with(model)?.choosing(LightChoice::Single)),
-        contestant("outer portal alone", flagged("window outer")?),
-        contestant("both, density of the direction", Techniques::with(model)?),
-        contestant("both, weighted by what gets through", Techniques::with(model)?.with_lights(learned)),
-        contestant("inner portal alone", flagged("window inner")?),
+        contestant("sky", Role::Competitor, Techniques::without(model)?),
+        contestant(
+            "both, single-hit density (wrong)",
+            Role::Fanlight,
+            Techniques::plain(model)?.choosing(LightChoice::Single),
+        ),
+        contestant("outer portal alone", Role::Fanlight, flagged("window outer")?),
+        contestant("both, density of the direction", Role::Fanlight, Techniques::plain(model)?),
+        contestant(
+            "both, weighted by what gets through",
+            Role::Fanlight,
+            Techniques::plain(model)?.with_lights(learned),
+        ),
+        contestant("inner portal alone", Role::Fanlight, flagged("window inner")?),
     ];
     let comparison = compare("nested, 1 bounce", &world, model.camera, 1, &contestants, effort)?;
     let mean = |image: &crate::render::Image| image.mean().element_sum();

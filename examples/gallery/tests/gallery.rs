@@ -47,12 +47,13 @@ fn compare_models(
     model.camera = model.camera.sized(SIZE);
     let world = World::new(&model);
     let without = techniques(&model);
-    let with = Techniques::with(&model).expect("lights");
     let [a, a_variance] = mean(&world, &model, &without, bounces, samples[0]);
-    let [b, b_variance] = mean(&world, &model, &with, bounces, samples[1]);
-    let error = (a_variance + b_variance).sqrt();
-    assert!(error < share * b, "{name}: {error} says nothing about {a} and {b}");
-    assert!((a - b).abs() < LIMIT * error, "{name}: {a} without, {b} with, standard error {error}");
+    for with in [Techniques::plain(&model), Techniques::with_light_rays(&model)] {
+        let [b, b_variance] = mean(&world, &model, &with.expect("lights"), bounces, samples[1]);
+        let error = (a_variance + b_variance).sqrt();
+        assert!(error < share * b, "{name}: {error} says nothing about {a} and {b}");
+        assert!((a - b).abs() < LIMIT * error, "{name}: {a} without, {b} with, standard error {error}");
+    }
 }
 
 #[test]

@@ -28,7 +28,7 @@ impl Budget {
     }
 
     /// The part of the budget that is spent; 1 and more if all of it is.
-    fn spent(self, seconds: f64, samples: u32) -> f64 {
+    pub(crate) fn spent(self, seconds: f64, samples: u32) -> f64 {
         match self {
             Self::Seconds(budget) => seconds / budget,
             Self::Samples(budget) => f64::from(samples) / f64::from(budget),
@@ -62,7 +62,7 @@ impl Progressive<'_> {
     }
 
     /// Adds one sample to every pixel.
-    fn add_pass(&self, film: &mut Film) {
+    pub(crate) fn add_pass(&self, film: &mut Film) {
         let pass = film.samples();
         let (width, pixels) = film.add_pass();
         pixels.par_chunks_mut(width).enumerate().for_each(|(y, row)| {

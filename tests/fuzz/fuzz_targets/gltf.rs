@@ -55,7 +55,7 @@ libfuzzer_sys::fuzz_target!(|data: &[u8]| {
                 return;
             }
             let world = World::new(&model);
-            let Ok(techniques) = Techniques::with(&model) else { return };
+            let Ok(techniques) = Techniques::plain(&model) else { return };
             let tracer = PathTracer::new(&world, &techniques, 1);
             let camera = model.camera.sized([3, 2]);
             Progressive { tracer, camera, seed: 1 }.render(Budget::Samples(1), drop);

@@ -252,7 +252,7 @@ fn survives(bytes: &[u8], renders: bool) -> bool {
             if renders {
                 let model = read.model;
                 let world = World::new(&model);
-                let Ok(techniques) = Techniques::with(&model) else { return false };
+                let Ok(techniques) = Techniques::plain(&model) else { return false };
                 let tracer = PathTracer::new(&world, &techniques, 1);
                 Progressive { tracer, camera: model.camera.sized([4, 3]), seed: 1 }.render(Budget::Samples(1), drop);
             }

@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::{File, LIMITS, assert_near, brightness, brightness_by};
-use crate::gltf::read;
+use crate::gltf::{Prefixes, Read, read};
 use crate::render::{Lobe, Techniques, World};
 
 /// How much two means may differ that are of different points of the same pixels.
@@ -191,4 +191,18 @@ fn paper_is_a_portal() {
     let read = file.read();
     assert_eq!(read.model.materials[read.model.meshes[0].material].lobe, Lobe::Translucent(0.5));
     assert!(read.contents[1].contains("portal meshes: 1"), "{:?}", read.contents);
+}
+
+/// What a file calls opaque is a pane if one says so, flagged or not.
+#[test]
+fn panes_by_name() {
+    let mut file = File::lamp();
+    file.json["materials"][0] = json!({ "name": "Glass.001" });
+    for (portals, count) in [("glass", 1), ("window", 0)] {
+        let prefixes = Prefixes { portals, panes: Some("glass") };
+        let Read { model, contents, .. } = read(&file.bytes(), None, prefixes, None, LIMITS).expect("a scene");
+        let material = &model.materials[model.meshes[0].material];
+        assert_eq!((material.lobe, material.two_sided), (Lobe::Clear, true));
+        assert!(contents[1].contains(&format!("portal meshes: {count}")), "{contents:?}");
+    }
 }

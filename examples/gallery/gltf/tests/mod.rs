@@ -186,7 +186,7 @@ impl Read {
 
 /// Mean of the lower third of a picture.
 pub(super) fn brightness(model: &Model) -> f64 {
-    brightness_by(model, &Techniques::with(model).expect("lights"))
+    brightness_by(model, &Techniques::plain(model).expect("lights"))
 }
 
 /// The same by some techniques.

@@ -18,7 +18,7 @@ mod wide_tree;
 use fanlight::{Receiver, ShadingPoint};
 use glam::Vec3;
 
-use super::lighting::Proposal;
+use super::lighting::{Aim, Proposal};
 use super::model::Model;
 use super::scene::Point;
 use averages::Averages;
@@ -77,8 +77,7 @@ impl Published {
         (facing > 0.0 && pdf.is_finite() && pdf > 0.0).then_some(Proposal {
             direction: step / distance,
             pdf,
-            distance: Some(distance),
-            lamp: None,
+            aim: Aim::Point(distance),
         })
     }
 
