@@ -21,7 +21,7 @@ pub(crate) fn run(name: &str, args: &Args) -> Vec<Row> {
         return vec![];
     }
     let is_wanted = |method: &&str| args.wants_method(method, variant) && !(args.quick && *method == "tessellated");
-    let on_request = methods::ARITIES.iter().filter(|method| args.methods.iter().any(|name| name == *method));
+    let on_request = methods::ON_REQUEST.iter().filter(|method| args.methods.iter().any(|name| name == *method));
     let names: Vec<&str> = methods::names(name).iter().chain(on_request).copied().filter(is_wanted).collect();
     if names.is_empty() {
         return vec![];

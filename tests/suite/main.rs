@@ -19,6 +19,9 @@ mod edits;
 mod emission;
 mod environment_light;
 mod errors;
+// The files are of a machine that writes the least byte first.
+#[cfg(target_endian = "little")]
+mod frozen;
 mod fuzz_regressions;
 #[cfg(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))]
 mod golden;

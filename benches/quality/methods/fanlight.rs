@@ -1,6 +1,6 @@
 //! The crate itself.
 
-use ::fanlight::{Arity, Hit, Illumination, LightSample, LightSampler, Mesh, ShadingPoint, Weight};
+use ::fanlight::{Arity, Effort, Hit, Illumination, LightSample, LightSampler, Mesh, ShadingPoint, Weight};
 
 use super::{Drawn, Method};
 use crate::scenes::sky::environment;
@@ -12,6 +12,7 @@ pub(crate) struct Fanlight<'a> {
     sampler: LightSampler,
     /// Whether a ray can cross several portals, so that the density of a point is not that of its direction.
     layered: bool,
+    effort: Effort,
 }
 
 impl<'a> Fanlight<'a> {
@@ -38,7 +39,12 @@ impl<'a> Fanlight<'a> {
             builder.add_mesh(&mesh).expect("workloads are valid");
         }
         let sampler = builder.build().expect("workloads are valid");
-        Self { scene, sampler, layered: scene.walls.len() > 1 }
+        Self { scene, sampler, layered: scene.walls.len() > 1, effort: Effort::Full }
+    }
+
+    /// The crate with an effort at all points.
+    pub(crate) fn with_effort(self, effort: Effort) -> Self {
+        Self { effort, ..self }
     }
 }
 
@@ -63,7 +69,7 @@ impl Fanlight<'_> {
 impl Method for Fanlight<'_> {
     #[inline]
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn> {
-        let here = self.sampler.at(x);
+        let here = self.sampler.at(&x.with_effort(self.effort));
         let sample = here.sample(u)?;
         let pdf = if self.layered { here.pdf_sample_direction(&sample) } else { sample.pdf };
         Some(self.drawn(&sample, pdf))
@@ -72,7 +78,7 @@ impl Method for Fanlight<'_> {
     /// For emitters `at` and `sample`; for portals, whatever their layers, the density of the direction as well.
     #[inline]
     fn call(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<f64> {
-        let here = self.sampler.at(x);
+        let here = self.sampler.at(&x.with_effort(self.effort));
         let sample = here.sample(u)?;
         let pdf = if self.scene.sky.is_some() { here.pdf_sample_direction(&sample) } else { sample.pdf };
         Some(f64::from(pdf))
@@ -80,7 +86,7 @@ impl Method for Fanlight<'_> {
 
     #[inline]
     fn pdf(&self, x: &ShadingPoint, drawn: &Drawn) -> f64 {
-        let here = self.sampler.at(x);
+        let here = self.sampler.at(&x.with_effort(self.effort));
         if self.layered {
             return f64::from(here.pdf_direction(drawn.direction));
         }
@@ -89,7 +95,7 @@ impl Method for Fanlight<'_> {
     }
 
     fn pmfs(&self, x: &ShadingPoint, wanted: &dyn Fn(usize) -> bool) -> Option<Vec<f64>> {
-        let here = self.sampler.at(x);
+        let here = self.sampler.at(&x.with_effort(self.effort));
         let pmf = |l: usize| if wanted(l) { here.pmf(self.scene.lights[l].id) } else { 0.0 };
         Some((0..self.scene.lights.len()).map(|l| f64::from(pmf(l))).collect())
     }

@@ -17,7 +17,7 @@ mod texel_cdf;
 mod triangle;
 mod wide_tree;
 
-use ::fanlight::{Arity, Illumination, ShadingPoint};
+use ::fanlight::{Arity, Effort, Illumination, ShadingPoint};
 use glam::Vec3;
 
 pub(crate) use self::fanlight::Fanlight;
@@ -79,8 +79,8 @@ pub(crate) trait Method: Sync {
     }
 }
 
-/// Other arities of the tree over triangles than the default, run on any workload if they are named.
-pub(crate) const ARITIES: [&str; 3] = ["fanlight-4", "fanlight-8", "fanlight-16"];
+/// Other arities of the tree over triangles than the default, and the least effort: run on any workload if they are named.
+pub(crate) const ON_REQUEST: [&str; 4] = ["fanlight-4", "fanlight-8", "fanlight-16", "fanlight-least"];
 
 /// Methods that are run on a workload, or a variant of it, by default.
 pub(crate) fn names(workload: &str) -> &'static [&'static str] {
@@ -171,6 +171,7 @@ pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
     let of_arity = |arity| Box::new(Fanlight::with(scene, arity, Illumination::default()));
     match name {
         "fanlight" => Box::new(Fanlight::new(scene)),
+        "fanlight-least" => Box::new(Fanlight::new(scene).with_effort(Effort::Least)),
         "fanlight-4" => of_arity(Arity::Four),
         "fanlight-8" => of_arity(Arity::Eight),
         "fanlight-16" => of_arity(Arity::Sixteen),

@@ -1,0 +1,158 @@
+//! Bytes that an earlier build wrote load, and mean what they meant.
+//!
+//! `FROZEN=write cargo test --test suite frozen` writes the files from the scenes below. That is for new scenes alone: a file that
+//! is committed stays as it is, whatever the crate becomes.
+
+use std::path::{Path, PathBuf};
+
+use fanlight::{
+    Arity, DiskLight, DistantLight, Environment, Filter, Instance, LightSample, LightSampler, LightSamplerView, Mesh,
+    PointLight, Profile, ProfileLight, Projection, ShadingPoint, Sides, SphereLight, SpotLight, Texture, TubeLight,
+    Visibility, VisibilityView, Weight, Wrap,
+};
+use glam::{Affine3A, Quat, Vec2, Vec3, vec3};
+
+use crate::common::lights::aligned;
+use crate::common::pcg::Pcg32;
+use crate::common::scene::random_point;
+use crate::common::statistics::Mean;
+use crate::kinds::pdf_again;
+
+/// Standard errors of a difference that are granted: two-sided, 1e-6 by the normal distribution.
+const LIMIT: f64 = 4.9;
+const SAMPLES: usize = 3000;
+const POINTS: usize = 30;
+
+const QUAD: [[u32; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
+
+fn quad(low: Vec3, x: Vec3, y: Vec3) -> [Vec3; 4] {
+    [low, low + x, low + x + y, low + y]
+}
+
+/// A sky with a sun.
+fn sky() -> Environment {
+    let texels: Vec<f32> =
+        (0..32 * 16).map(|i| if i == 4 * 32 + 11 { 300.0 } else { 0.3 + 0.01 * (i % 7) as f32 }).collect();
+    Environment::from_lat_long(32, 16, &texels, Filter::Bilinear).expect("a good image")
+}
+
+/// A textured lamp, a textured window, lamps of every kind, light groups, instances, and what moves in the shutter.
+fn everything() -> LightSampler {
+    let image: Vec<f32> = (0..64).map(|i| [0.0, 0.2, 1.0][i * i % 3]).collect();
+    let uvs = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+    let mut builder = LightSampler::builder().environment(sky());
+    let texture = Texture::new(8, 8, &image).expect("a good image").wrap(Wrap::Clamp, Wrap::Clamp);
+    let texture = builder.add_texture(texture);
+    let screen = quad(vec3(-1.0, 2.0, 0.0), 2.0 * Vec3::X, Vec3::Z);
+    let window = quad(vec3(2.0, -1.0, 0.0), 2.0 * Vec3::Y, Vec3::Z);
+    let panel = quad(vec3(-0.5, -0.5, 3.0), Vec3::Y, Vec3::X);
+    let later = panel.map(|vertex| vertex + vec3(0.3, 0.0, -0.4));
+    let meshes = [
+        Mesh::emitter(&screen, &QUAD).uvs(&uvs).weight(Weight::Texture(texture)).sides(Sides::Two),
+        Mesh::portal(&window, &QUAD).uvs(&uvs).weight(Weight::Texture(texture)),
+        Mesh::emitter(&panel, &QUAD).weight(Weight::Constant(3.0)).moving_to(&later).groups(5),
+    ];
+    for mesh in &meshes {
+        builder.add_mesh(mesh).expect("a good mesh");
+    }
+    let small = quad(Vec3::splat(-0.1), 0.2 * Vec3::Y, 0.2 * Vec3::X);
+    let lamp = builder.add_object(&[Mesh::emitter(&small, &QUAD).sides(Sides::Two)]).expect("a good object");
+    for i in 0..5 {
+        let place = vec3(i as f32 - 2.0, 0.5, 2.0);
+        let scale = vec3(1.0, 1.0 + 0.5 * i as f32, if i == 3 { -2.0 } else { 1.0 });
+        let transform = |angle| Affine3A::from_scale_rotation_translation(scale, Quat::from_rotation_x(angle), place);
+        let instance = Instance::new(lamp, transform(0.2 * i as f32)).scaled(4.0);
+        let instance = if i == 4 { instance.moving_to(transform(1.5)) } else { instance };
+        builder.add_instance(instance).expect("a good instance");
+    }
+    let profile = Profile { vertical: &[0.0, 0.8, 1.5], horizontal: &[0.0], intensities: &[1.0, 0.5, 0.0] };
+    let profile = builder.add_profile(&profile).expect("a good profile");
+    let slide =
+        Projection { angles: [0.8, 0.6], size: [2, 2], intensities: &[1.0, 0.0, 0.3, 2.0], filter: Filter::Bilinear };
+    let slide = builder.add_projection(&slide).expect("a good projection");
+    builder.add_light(SphereLight::new(vec3(-1.5, -1.5, 1.0), 0.2, 5.0)).expect("a good light");
+    builder.add_light(DiskLight::new(vec3(1.5, -1.5, 1.5), -Vec3::Z, 0.3, 2.0)).expect("a good light");
+    builder.add_light(TubeLight::new([vec3(-1.0, -2.0, 2.0), vec3(1.0, -2.0, 2.0)], 0.05, 3.0)).expect("a good light");
+    builder.add_light_to(3, PointLight::new(vec3(0.0, 0.0, 2.5), 2.0)).expect("a good light");
+    builder.add_light(SpotLight::new(vec3(1.0, 1.0, 2.5), -Vec3::Z, 3.0, [0.3, 0.8])).expect("a good light");
+    builder.add_light(ProfileLight::new(vec3(-1.0, 1.0, 2.5), -Vec3::Z, profile, 2.0)).expect("a good light");
+    builder.add_light(ProfileLight::new(vec3(-2.0, 0.0, 1.5), Vec3::X, slide, 2.0)).expect("a good light");
+    builder.add_light_to(6, DistantLight::new(-Vec3::Z, 0.5).angular_radius(0.1)).expect("a good light");
+    builder.add_light(DistantLight::new(vec3(1.0, 0.0, -2.0), 0.2)).expect("a good light");
+    builder.build().expect("a good scene")
+}
+
+/// Few lights under an open sky, in a tree of another arity.
+fn open_sky() -> LightSampler {
+    let lamp = quad(vec3(-0.5, -0.5, 2.0), Vec3::Y, Vec3::X);
+    let mut builder = LightSampler::builder().arity(Arity::Four).environment(sky()).environment_as_light();
+    builder.add_mesh(&Mesh::emitter(&lamp, &QUAD).weight(Weight::Constant(2.0))).expect("a good mesh");
+    builder.build().expect("a good scene")
+}
+
+/// What a wall hides.
+fn learned(lights: &LightSampler) -> Visibility {
+    let point = |i: u64| random_point(&mut Pcg32::new(i, 91), i as usize);
+    let seen =
+        |x: &ShadingPoint, sample: &LightSample| f32::from(u8::from((x.position.x > 0.5) == (sample.position.x > 0.5)));
+    Visibility::learn(&lights.as_view(), 3000, point, seen).expect("nobody cancels")
+}
+
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/frozen").join(name)
+}
+
+/// Returns the bytes of a file, after writing them if that is asked for.
+fn frozen(name: &str, bytes: impl Fn() -> Vec<u8>) -> Vec<u32> {
+    if std::env::var("FROZEN").is_ok_and(|value| value == "write") {
+        std::fs::write(path(name), bytes()).expect("the file can be written");
+    }
+    aligned(&std::fs::read(path(name)).expect("the file can be read"))
+}
+
+/// Mean of what samples bring, walls left out.
+fn estimate(lights: &LightSamplerView<'_>, x: &ShadingPoint, pcg: &mut Pcg32) -> Mean {
+    let at = lights.at(x);
+    let mut mean = Mean::default();
+    for _ in 0..SAMPLES {
+        let brought = at.sample(pcg.cube()).map_or(0.0, |sample| {
+            let again = pdf_again(&at, &sample);
+            assert!((again - sample.pdf).abs() <= 1e-4 * sample.pdf, "{sample:?}: {again}");
+            f64::from(x.weight(sample.direction)) / f64::from(sample.pdf)
+        });
+        mean.add(brought);
+    }
+    mean
+}
+
+/// The file and a new build hold the same lights, and estimates from both agree.
+fn check(loaded: &LightSamplerView<'_>, fresh: &LightSamplerView<'_>, seed: u64) {
+    assert_eq!(loaded.light_count(), fresh.light_count());
+    let mut pcg = Pcg32::new(seed, 92);
+    for kind in 0..POINTS {
+        let x = random_point(&mut pcg, kind).at_time(pcg.f32()).with_groups([u32::MAX, 1, 4][kind % 3]);
+        let [a, b] = [loaded, fresh].map(|lights| estimate(lights, &x, &mut pcg));
+        let limit = LIMIT * (a.error().powi(2) + b.error().powi(2)).sqrt() + 1e-6;
+        assert!((a.mean() - b.mean()).abs() <= limit, "{x:?}: {} and {}, limit {limit}", a.mean(), b.mean());
+    }
+}
+
+#[test]
+fn bytes_of_every_kind_of_light_load() {
+    let fresh = everything();
+    let words = frozen("lights.bin", || fresh.to_bytes());
+    let loaded = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("bytes of an earlier build load");
+    check(&loaded, &fresh.as_view(), 1);
+    let table = frozen("visibility.bin", || learned(&fresh).to_bytes());
+    let table = VisibilityView::from_bytes(bytemuck::cast_slice(&table)).expect("bytes of an earlier build load");
+    let seen = loaded.with_visibility(table).expect("it was learned for these lights");
+    check(&seen, &fresh.as_view(), 2);
+}
+
+#[test]
+fn bytes_of_an_open_sky_load() {
+    let fresh = open_sky();
+    let words = frozen("open-sky.bin", || fresh.to_bytes());
+    let loaded = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("bytes of an earlier build load");
+    check(&loaded, &fresh.as_view(), 3);
+}
