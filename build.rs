@@ -1,4 +1,5 @@
-//! Sets `cfg(fanlight_avx512)` where the compiler knows AVX-512, which became stable later than what else the crate needs.
+//! Sets `cfg(fanlight_avx512)` where the compiler knows AVX-512, which became stable later than what else the crate
+//! needs.
 
 use std::process::Command;
 

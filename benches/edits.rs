@@ -1,11 +1,11 @@
 //! Times of edits between frames beside those of rebuilds, and how well an edited tree chooses beside a new one.
 //!
-//! `cloud-N` is `N` lights without an extent at random in the unit cube. A frame is 100 edits: 20 lights come, 20 go, 20 move
-//! anywhere, 20 move a little, 20 change their brightness. Times are means over all frames, with everything that is built again
-//! meanwhile. A rebuild is a call of `build`, without the calls that add lights to the builder.
+//! `cloud-N` is `N` lights without an extent at random in the unit cube. A frame is 100 edits: 20 lights come, 20 go,
+//! 20 move anywhere, 20 move a little, 20 change their brightness. Times are means over all frames, with everything
+//! that is built again meanwhile. A rebuild is a call of `build`, without the calls that add lights to the builder.
 //!
-//! `exact-sel` is the variance of the irradiance that is left by the choice of a light, relative to the squared irradiance: the
-//! median over shading points.
+//! `exact-sel` is the variance of the irradiance that is left by the choice of a light, relative to the squared
+//! irradiance: the median over shading points.
 //!
 //! `cargo bench -p fanlight-benches --bench edits`; with `--features rayon`, rebuilds on all threads.
 
@@ -172,8 +172,8 @@ fn row(count: usize) {
             let own: Vec<u32> = (0..).zip(&cloud.0).filter_map(|(id, light)| light.map(|_| id)).collect();
             let new: Vec<u32> = (0..own.len() as u32).collect();
             let [edited, built] = [(&lights, &own), (&fresh, &new)].map(|(lights, ids)| cloud.variances(lights, ids));
-            // The mean over points of the logarithm, as variances of points differ by orders of magnitude. Where nothing arrives
-            // there is none.
+            // The mean over points of the logarithm, as variances of points differ by orders of magnitude. Where
+            // nothing arrives there is none.
             let logarithms = edited.iter().zip(&built).map(|(edited, built)| (edited / built).ln());
             let known: Vec<f64> = logarithms.filter(|ratio| ratio.is_finite()).collect();
             let mean = known.iter().sum::<f64>() / known.len() as f64;

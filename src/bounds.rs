@@ -13,8 +13,8 @@ pub(crate) struct LightBounds {
     pub(crate) aabb: Aabb,
     /// Normals of the front sides.
     pub(crate) normals: Cone,
-    /// Largest angle to its normal at which a light sends (θe): π/2 for surfaces, less for spots, and π for what sends in all
-    /// directions and has no normal.
+    /// Largest angle to its normal at which a light sends (θe): π/2 for surfaces, less for spots, and π for what sends
+    /// in all directions and has no normal.
     pub(crate) emission: f32,
     /// Weight times area of what does not depend on the direction it is seen from: mesh lights, and portals to a
     /// constant environment.
@@ -64,10 +64,10 @@ impl LightBounds {
     }
 }
 
-/// Returns the solid angle, weighted by the falloff at its rim, of the directions that lights may send into whose normals
-/// are within an angle with this cosine of an axis: `M_Ω` of the surface area orientation heuristic (Conty Estevez and Kulla
-/// 2018, section 4.1) for θe = π/2, where all of its arccosines but one cancel. That one is approximated to within 7e-5
-/// radians (Abramowitz and Stegun 1964, 4.4.45).
+/// Returns the solid angle, weighted by the falloff at its rim, of the directions that lights may send into whose
+/// normals are within an angle with this cosine of an axis: `M_Ω` of the surface area orientation heuristic (Conty
+/// Estevez and Kulla 2018, section 4.1) for θe = π/2, where all of its arccosines but one cancel. That one is
+/// approximated to within 7e-5 radians (Abramowitz and Stegun 1964, 4.4.45).
 #[inline]
 pub(crate) fn orientation_measure(cos: f32, two_sided: bool) -> f32 {
     let sin = math::sqrt((1.0 - cos * cos).max(0.0));

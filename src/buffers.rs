@@ -1,13 +1,13 @@
 //! Plain-data buffers, and the sections of bytes that they are written to.
 //!
-//! A structure lists its buffers once, with [`buffers!`]. The owned form, the borrowed form, the sizes, the writer and the
-//! reader all come from that list, so that a new buffer is one line.
+//! A structure lists its buffers once, with [`buffers!`]. The owned form, the borrowed form, the sizes, the writer and
+//! the reader all come from that list, so that a new buffer is one line.
 //!
 //! # Layout of the bytes
 //!
-//! A [`Header`], one [`Entry`] for each section, then the sections one after the other. A section is an array of plain data
-//! under a tag of four letters, with a version of its own. Every section starts at a multiple of [`ALIGNMENT`] and all
-//! numbers are in the byte order of the machine that wrote them.
+//! A [`Header`], one [`Entry`] for each section, then the sections one after the other. A section is an array of plain
+//! data under a tag of four letters, with a version of its own. Every section starts at a multiple of [`ALIGNMENT`] and
+//! all numbers are in the byte order of the machine that wrote them.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -110,8 +110,8 @@ impl<'a> Sections<'a> {
     ///
     /// # Errors
     ///
-    /// If the bytes do not start at a multiple of [`ALIGNMENT`], are cut off or too long, or of another container version or
-    /// byte order.
+    /// If the bytes do not start at a multiple of [`ALIGNMENT`], are cut off or too long, or of another container
+    /// version or byte order.
     pub(crate) fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         let misaligned = bytes.as_ptr() as usize % ALIGNMENT;
         Error::unless_equal("alignment", misaligned, 0)?;

@@ -54,24 +54,24 @@
 //! The first and the third belong together in multiple importance sampling, and so do the second and the fourth. A
 //! portal does not end a ray: where a second portal may lie on the way, use the first and the third.
 //!
-//! Lights that are not made of triangles are in the same tree: [`SphereLight`], [`DiskLight`], [`TubeLight`], and without an
-//! extent [`PointLight`] and [`SpotLight`]. [`DistantLight`]s are in no tree and compete with it. [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a
-//! [`LightId`].
+//! Lights that are not made of triangles are in the same tree: [`SphereLight`], [`DiskLight`], [`TubeLight`], and
+//! without an extent [`PointLight`] and [`SpotLight`]. [`DistantLight`]s are in no tree and compete with it.
+//! [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a [`LightId`].
 //!
-//! What stands in a scene many times is built once: [`add_object`](LightSamplerBuilder::add_object) takes the meshes, and
-//! [`add_instance`](LightSamplerBuilder::add_instance) places them by any affine map ([`Instance`]).
+//! What stands in a scene many times is built once: [`add_object`](LightSamplerBuilder::add_object) takes the meshes,
+//! and [`add_instance`](LightSamplerBuilder::add_instance) places them by any affine map ([`Instance`]).
 //!
-//! What moves while the shutter is open says where it is at the end ([`Mesh::moving_to`], [`Instance::moving_to`]), and a shading
-//! point says its time ([`ShadingPoint::at_time`]); all densities are those of that time.
+//! What moves while the shutter is open says where it is at the end ([`Mesh::moving_to`], [`Instance::moving_to`]), and
+//! a shading point says its time ([`ShadingPoint::at_time`]); all densities are those of that time.
 //!
-//! Photons start with [`LightSampler::emission`]. In participating media, [`LightSampler::along`] chooses a distance along a
-//! ray.
+//! Photons start with [`LightSampler::emission`]. In participating media, [`LightSampler::along`] chooses a distance
+//! along a ray.
 //!
 //! Portals that cover only a part of what the environment shows need a partner that reaches the rest: combine them with
 //! BSDF samples, or with [`Environment::sample`], or make the environment a light
 //! ([`environment_as_light`](LightSamplerBuilder::environment_as_light)). Then a sample may be a direction of it
-//! ([`SampledLight`]), and [`pdf_environment`](PointSampler::pdf_environment) is the density of a ray that leaves a scene
-//! without portals.
+//! ([`SampledLight`]), and [`pdf_environment`](PointSampler::pdf_environment) is the density of a ray that leaves a
+//! scene without portals.
 //!
 //! The [`guide`] goes through the integration into a renderer, and has a table of mistakes and what they look like.
 //!
@@ -94,16 +94,17 @@
 //! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
 //! - products with a BSDF or a phase function, beyond the cosine.
 //! - reading image or scene files.
-//! - another environment, other objects and other profiles in a built sampler. The environment can be rotated; lights, meshes and
-//!   instances can be added, removed and changed ([`edit`](LightSampler::edit), [`refit`](LightSampler::refit)).
+//! - another environment, other objects and other profiles in a built sampler. The environment can be rotated; lights,
+//!   meshes and instances can be added, removed and changed ([`edit`](LightSampler::edit),
+//!   [`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.
 //!
 //! # Units and measures
 //!
 //! Lengths are in any unit, as long as it is the same everywhere; coordinates go up to 1e9. The weight of an emitter is
 //! its radiance, the weight of a portal its transmittance, and the environment holds radiance. Radiance is in any unit
-//! too, but in the same unit for emitters and environment, because they compete for samples. The weight of a light without
-//! an extent is its radiant intensity: radiance times the square of the unit of length.
+//! too, but in the same unit for emitters and environment, because they compete for samples. The weight of a light
+//! without an extent is its radiant intensity: radiance times the square of the unit of length.
 //!
 //! Densities are per solid angle at the shading point (1/sr) unless their name or their documentation says per area of
 //! the light. `pmf` is a probability, without a unit.

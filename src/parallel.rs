@@ -112,8 +112,8 @@ pub(crate) fn map<T, R, F>(items: &[T], _threshold: usize, map: impl Fn(&T) -> R
     items.iter().map(map).collect()
 }
 
-/// Passes every chunk of a slice to `work`, with the chunk's index. All chunks have `chunk_len` elements, which is above
-/// zero, but perhaps the last one.
+/// Passes every chunk of a slice to `work`, with the chunk's index. All chunks have `chunk_len` elements, which is
+/// above zero, but perhaps the last one.
 #[cfg(feature = "rayon")]
 pub(crate) fn for_each_chunk<T: Send>(
     elements: &mut [T],

@@ -52,8 +52,8 @@ impl<'a> Progress<'a> {
     }
 }
 
-/// Largest share that is reported before the end. Only shown to the host: chosen, not measured. Larger would look like the
-/// end to a host that rounds.
+/// Largest share that is reported before the end. Only shown to the host: chosen, not measured. Larger would look like
+/// the end to a host that rounds.
 const LARGEST_SHARE: f64 = 0.99;
 
 /// Count from which on the host has cancelled. *Format*: the highest bit, which no number of units reaches.

@@ -122,8 +122,8 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "star-10000-instances/nee", calls: CALLS, run: || star_instances(10_000) },
 ];
 
-/// A point of a triangle that no workload has: its density costs what the first call at a shading point finds for all, and
-/// nothing more.
+/// A point of a triangle that no workload has: its density costs what the first call at a shading point finds for all,
+/// and nothing more.
 const NOWHERE: Hit = Hit::new(TriangleId::new(MeshId::from_index(u32::MAX), 0), [0.0; 2]);
 
 /// Everything in here is counted, and nothing else.

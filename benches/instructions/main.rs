@@ -6,8 +6,8 @@
 //! cargo bench -p fanlight-benches --bench instructions -- --update  # writes the baseline
 //! ```
 //!
-//! Cases named `nee` are what a host does at a lit point: `at`, `sample`, and the density of the sampled direction. Those with
-//! `lobe` are at glossy surfaces of roughness 0.1.
+//! Cases named `nee` are what a host does at a lit point: `at`, `sample`, and the density of the sampled direction.
+//! Those with `lobe` are at glossy surfaces of roughness 0.1.
 //!
 //! The program runs itself under Valgrind once for each case, and has what happens inside of [`measured`] counted.
 

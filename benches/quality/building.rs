@@ -1,9 +1,9 @@
-//! Buildings of many rooms, in which nearly everything hides from everything: the crate blind to walls, and with learned
-//! visibility.
+//! Buildings of many rooms, in which nearly everything hides from everything: the crate blind to walls, and with
+//! learned visibility.
 //!
-//! A light sample counts here only if it gets through. Walls are planes without thickness, so that visibility is exact, and
-//! variance is integrated over points of all lights instead of being estimated from the samples of the method: what a method
-//! draws too seldom cannot hide.
+//! A light sample counts here only if it gets through. Walls are planes without thickness, so that visibility is exact,
+//! and variance is integrated over points of all lights instead of being estimated from the samples of the method: what
+//! a method draws too seldom cannot hide.
 
 use core::hint::black_box;
 use std::time::Instant;
@@ -318,7 +318,8 @@ impl Building {
         ((along - 2.0).abs() < 0.6 && (1.0..2.2).contains(&z)).then_some((0, point))
     }
 
-    /// Draws a plan of one story: how often one lamp is chosen at each place of the floor, without the table and with it.
+    /// Draws a plan of one story: how often one lamp is chosen at each place of the floor, without the table and with
+    /// it.
     fn plan(&self, visibility: &Visibility, path: &std::path::Path) {
         const PIXELS: u32 = 12;
         /// Number of the lamp, and its story.

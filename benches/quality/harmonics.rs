@@ -1,9 +1,9 @@
 //! Integrals of spherical harmonics over spherical polygons in closed form (Wang and Ramamoorthi 2018, "Analytic
 //! Spherical Harmonic Coefficients for Polygonal Area Lights").
 //!
-//! A band of harmonics is spanned by Legendre polynomials about `2 l + 1` axes, so that a function is kept as weights of
-//! polynomials. The integral of a polynomial over a polygon is a sum over its edges, by Green's theorem and a recurrence
-//! along the edge.
+//! A band of harmonics is spanned by Legendre polynomials about `2 l + 1` axes, so that a function is kept as weights
+//! of polynomials. The integral of a polynomial over a polygon is a sum over its edges, by Green's theorem and a
+//! recurrence along the edge.
 
 use core::f64::consts::{PI, TAU};
 

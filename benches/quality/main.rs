@@ -1,9 +1,8 @@
 //! How noisy, how fast and how large the crate's sampling is, next to other methods on the same workloads.
 //!
-//! `cargo bench -p fanlight-benches --bench quality` prints one row for each workload, method and class of shading points; `-- --quick`
-//! takes less than a minute. `-- --stratification`, `--splitting`, `--lobes`, `--terms`, `--harmonics`
-//! and `--room` run a study instead, and
-//! `--everything` all of them after the table.
+//! `cargo bench -p fanlight-benches --bench quality` prints one row for each workload, method and class of shading
+//! points; `-- --quick` takes less than a minute. `-- --stratification`, `--splitting`, `--lobes`, `--terms`,
+//! `--harmonics` and `--room` run a study instead, and `--everything` all of them after the table.
 //!
 //! Some workloads can be handed to a method in two ways: openings as holes or as a clip map, a clip map that is read
 //! with one filter or another. The light is the same, so it is the same workload, and the second way is part of the

@@ -1,7 +1,7 @@
 //! What is saved where a scene does not need something: pairs of scenes, one with and one without it.
 //!
-//! `cargo bench -p fanlight-benches --bench skip` prints a table. Times are medians of runs that take turns, so that both see the same
-//! machine; bytes are those that the samplers report.
+//! `cargo bench -p fanlight-benches --bench skip` prints a table. Times are medians of runs that take turns, so that
+//! both see the same machine; bytes are those that the samplers report.
 
 #[path = "../instruction_set.rs"]
 mod instruction_set;
@@ -209,8 +209,8 @@ fn room_points() -> Vec<ShadingPoint> {
     scenes::points::PointSet::Room.timing(1024)
 }
 
-/// Points in and around the unit cube; below its middle, with a normal, if one is given: with one along z all lights of the
-/// cube are above their horizon, with one across about half of them.
+/// Points in and around the unit cube; below its middle, with a normal, if one is given: with one along z all lights of
+/// the cube are above their horizon, with one across about half of them.
 fn cube_points(normal: Option<Vec3>) -> Vec<ShadingPoint> {
     let mut points = scenes::points::PointSet::Cube.timing(1024);
     if let Some(normal) = normal {

@@ -1,9 +1,10 @@
 //! Luminaires from files of the format LM-63 (ANSI/IES LM-63-2002 and -2019, and those before), called `.ies`.
 //!
-//! A file holds a table of candelas by vertical and horizontal angle. Of photometry of type C, the usual one, the vertical angle
-//! is 0 straight down and 180 degrees straight up, and horizontal angles grow counter-clockwise as seen from above. Types A and B
-//! (automotive lamps and floodlights) have other angles, and are refused. Lumens, sizes and powers are read over, and so is what
-//! a tilt of the lamp changes: the luminaire is in the position in which it was measured.
+//! A file holds a table of candelas by vertical and horizontal angle. Of photometry of type C, the usual one, the
+//! vertical angle is 0 straight down and 180 degrees straight up, and horizontal angles grow counter-clockwise as seen
+//! from above. Types A and B (automotive lamps and floodlights) have other angles, and are refused. Lumens, sizes and
+//! powers are read over, and so is what a tilt of the lamp changes: the luminaire is in the position in which it was
+//! measured.
 
 use core::f32::consts::PI;
 
@@ -16,8 +17,8 @@ const HEADER: usize = 13;
 /// Most angles of either kind.
 const MOST_ANGLES: usize = 2048;
 
-/// A table as `fanlight` has it: radians, all around the axis, counter-clockwise around a vertical angle 0 that looks at the
-/// viewer.
+/// A table as `fanlight` has it: radians, all around the axis, counter-clockwise around a vertical angle 0 that looks
+/// at the viewer.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Luminaire {
     pub(crate) vertical: Vec<f32>,
@@ -67,8 +68,8 @@ pub(crate) fn read(text: &str) -> Result<Luminaire, Error> {
     })
 }
 
-/// Returns horizontal angles all around, each with the number of the one that its values are those of. Files have less of what
-/// is symmetric: one angle, a quarter, the half from 0 to 180 degrees, or that from 90 to 270.
+/// Returns horizontal angles all around, each with the number of the one that its values are those of. Files have less
+/// of what is symmetric: one angle, a quarter, the half from 0 to 180 degrees, or that from 90 to 270.
 fn all_around(angles: &[f32]) -> Result<Vec<(f32, usize)>, Error> {
     let mut around: Vec<(f32, usize)> = angles.iter().copied().zip(0..).collect();
     let mirror = |around: &mut Vec<(f32, usize)>, sum: f32| {

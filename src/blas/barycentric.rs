@@ -10,8 +10,8 @@
 //! the sums of all groups are the sum of `R` vectors.
 //!
 //! An upright cell has the corners of the whole triangle in the same order. An inverted one is turned by half a circle:
-//! its corner `k` lies across from the edge that would be edge `k`. In its own coordinates an inverted cell is a triangle
-//! like any other, so that the next level does not see the difference.
+//! its corner `k` lies across from the edge that would be edge `k`. In its own coordinates an inverted cell is a
+//! triangle like any other, so that the next level does not see the difference.
 
 use crate::warp::triangle::square_to_triangle;
 
@@ -29,8 +29,8 @@ pub(crate) const MAX_HALVINGS: u32 = 20;
 /// Cells of a node. *Format*: it decides on the layout of [`CellNode`](super::node::CellNode).
 ///
 /// Chosen: a step is one loop over the lanes of a few vectors (docs/ACCURACY.md, "Wide steps"). Larger: more cells are
-/// weighed and stored that hardly differ. Smaller: fewer bytes, but larger cells, whose weights follow distance, cosine and
-/// radiance less closely; 4 and 16 had a multiple of the variance on a quad with spots, in a little less time.
+/// weighed and stored that hardly differ. Smaller: fewer bytes, but larger cells, whose weights follow distance, cosine
+/// and radiance less closely; 4 and 16 had a multiple of the variance on a quad with spots, in a little less time.
 pub(crate) const ARITY: usize = 64;
 
 /// Cells along one edge of a node.

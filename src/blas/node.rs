@@ -1,9 +1,9 @@
 //! What a BLAS is made of: plain data, in one pool for all triangles of a sampler.
 //!
-//! A node is [`ARITY`] cells, by the numbers that [`barycentric::child`](crate::blas::barycentric::child) gives them. The
-//! nodes of a tree are numbered breadth first, so that the nodes below the cells of a node have successive numbers. One bit
-//! for each cell and the first of these numbers are enough to find them (Jacobson 1989, level-order unary degree
-//! sequence).
+//! A node is [`ARITY`] cells, by the numbers that [`barycentric::child`](crate::blas::barycentric::child) gives them.
+//! The nodes of a tree are numbered breadth first, so that the nodes below the cells of a node have successive numbers.
+//! One bit for each cell and the first of these numbers are enough to find them (Jacobson 1989, level-order unary
+//! degree sequence).
 
 use alloc::vec::Vec;
 
@@ -32,8 +32,9 @@ const NODE_WORDS: usize = HEADER_WORDS + ARITY / 4;
 
 /// A node.
 ///
-/// Words 0 and 1 hold a bit for every cell, set if there is a node below the cell, and word 2 holds the number of the first
-/// such node. The bytes of the other words are the [codes](crate::blas::code) of the average weights over the cells.
+/// Words 0 and 1 hold a bit for every cell, set if there is a node below the cell, and word 2 holds the number of the
+/// first such node. The bytes of the other words are the [codes](crate::blas::code) of the average weights over the
+/// cells.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct CellNode([u32; NODE_WORDS]);

@@ -57,7 +57,8 @@ impl Environment {
     ///
     /// # Errors
     ///
-    /// Those of [`new`](Self::new), and one of which [`Error::is_cancelled`] is true if `report` has cancelled the build.
+    /// Those of [`new`](Self::new), and one of which [`Error::is_cancelled`] is true if `report` has cancelled the
+    /// build.
     pub fn new_with(
         image: &EnvironmentImage<'_>,
         report: impl Fn(f32) -> ControlFlow<()> + Sync,
@@ -223,7 +224,8 @@ impl Environment {
     }
 }
 
-/// Returns the depth of the smallest pyramid whose finest level has at least this many texels, at most [`MAX_PYRAMID_DEPTH`].
+/// Returns the depth of the smallest pyramid whose finest level has at least this many texels, at most
+/// [`MAX_PYRAMID_DEPTH`].
 fn depth_for(texels: u64) -> u32 {
     (0..MAX_PYRAMID_DEPTH).find(|depth| 1 << (2 * depth) >= texels).unwrap_or(MAX_PYRAMID_DEPTH)
 }

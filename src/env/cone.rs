@@ -1,10 +1,10 @@
 //! Radiance of a region of directions: an estimate that is zero only if all of the region is black.
 //!
-//! The radiance is looked up twice. The *talk's* lookup (Ogaki 2020, "MIP Maps for Environment Map"): the nearest
-//! texel of a 3x3 filtered level whose filter is as large as the region's solid angle. It is the better estimate, but a texel
-//! of it may miss what lies in the region. The *bounds*: at most 2x2 texels of a level that are sure to hold the
-//! whole region. They decide about black and constant, and their mean is a small share of the estimate so that
-//! nothing bright is lost.
+//! The radiance is looked up twice. The *talk's* lookup (Ogaki 2020, "MIP Maps for Environment Map"): the nearest texel
+//! of a 3x3 filtered level whose filter is as large as the region's solid angle. It is the better estimate, but a texel
+//! of it may miss what lies in the region. The *bounds*: at most 2x2 texels of a level that are sure to hold the whole
+//! region. They decide about black and constant, and their mean is a small share of the estimate so that nothing bright
+//! is lost.
 //!
 //! Why these texels hold the region: a geodesic from the region's center to any of its points is at most as long as the
 //! region's angular radius ρ. Its image in the plane that is tiled by rotated copies of the square is a

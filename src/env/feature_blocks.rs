@@ -7,7 +7,8 @@ use core::cmp::Ordering;
 use super::feature_texel::FeatureTexel;
 use super::features::TexelCluster;
 
-/// Relative variance within the blocks of a feature up to which they stay as they are. Chosen on captured suns, not swept.
+/// Relative variance within the blocks of a feature up to which they stay as they are. Chosen on captured suns, not
+/// swept.
 ///
 /// Larger: fewer blocks. Smaller: more of them, and the variance at points that see the whole feature falls with it.
 const BLOCK_VARIANCE: f64 = 0.004;
@@ -17,8 +18,8 @@ const BLOCK_VARIANCE: f64 = 0.004;
 /// Larger: where an opening cuts the feature, more of the block next to the edge is bent. Smaller: more blocks.
 const BLOCK_REACH: f32 = 0.3;
 
-/// Largest margin of a block over the radius of the feature, unless it is a single texel. Chosen on the window's sun, not
-/// swept.
+/// Largest margin of a block over the radius of the feature, unless it is a single texel. Chosen on the window's sun,
+/// not swept.
 ///
 /// Larger: more directions that miss the opening at its edges. Smaller: more blocks.
 const BLOCK_MARGIN: f32 = 0.002;
@@ -54,8 +55,8 @@ impl Ord for Block {
     }
 }
 
-/// Cuts a cluster of texels into at most `most` blocks, sorted by code. There are more only where a block would bend too
-/// much, or hold what does not belong to the cluster: `is_foreign` tells of a range of codes.
+/// Cuts a cluster of texels into at most `most` blocks, sorted by code. There are more only where a block would bend
+/// too much, or hold what does not belong to the cluster: `is_foreign` tells of a range of codes.
 pub(super) fn blocks(
     depth: u32,
     cluster: &TexelCluster,

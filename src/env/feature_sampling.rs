@@ -17,8 +17,8 @@ use crate::warp::{Variate, pick_pair};
 const FEATURE_ROUNDING: f32 = 2e-6;
 
 impl FeatureNode {
-    /// Sine of the angular radius of a cone that holds all directions of the node, however they were rounded. At least 1 for
-    /// a node that may hold any direction.
+    /// Sine of the angular radius of a cone that holds all directions of the node, however they were rounded. At least
+    /// 1 for a node that may hold any direction.
     #[inline]
     pub(crate) fn reach(&self) -> f32 {
         self.sin_radius + FEATURE_ROUNDING

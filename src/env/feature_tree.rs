@@ -149,8 +149,8 @@ impl Tree {
     }
 }
 
-/// Returns the sine of the radius of the disk with the blocks' mean square distance from an axis: that of a disk is half of its
-/// radius squared. A block adds a third of its half diagonal squared.
+/// Returns the sine of the radius of the disk with the blocks' mean square distance from an axis: that of a disk is
+/// half of its radius squared. A block adds a third of its half diagonal squared.
 fn spread(axis: Vec3, blocks: &[FeatureTexel], power: f32) -> f32 {
     let square = |block: &FeatureTexel| {
         let own = block.radius * block.radius / 3.0;

@@ -28,8 +28,8 @@ const MAX_DOUBLINGS: u32 = 60;
 /// What counts as a bright feature. None of the limits is part of the format: environments built with others load all
 /// the same.
 ///
-/// Contrast and radius are *measured* (docs/CONSTANTS.md, "Environment and bright features"): half and double of them change
-/// little. The other limits are budgets, chosen and not swept.
+/// Contrast and radius are *measured* (docs/CONSTANTS.md, "Environment and bright features"): half and double of them
+/// change little. The other limits are budgets, chosen and not swept.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeatureLimits {
     /// Ratio of the cap to the mean of the capped image. Larger: fewer texels are features, and the trees are guided

@@ -10,8 +10,8 @@
 //! `r = R`, a meridian is `b = F r`.
 
 //!
-//! A texel's edges are cut at parallels and meridians. Every piece adds to the area of its own cell what lies between it
-//! and the cell's meridian of lower azimuth, and to all cells of its row with less azimuth their full width: the
+//! A texel's edges are cut at parallels and meridians. Every piece adds to the area of its own cell what lies between
+//! it and the cell's meridian of lower azimuth, and to all cells of its row with less azimuth their full width: the
 //! coverage of a scan converter. What is added on one side of the texel is taken away on the other.
 
 use super::source::EnvironmentSource;
@@ -167,8 +167,8 @@ impl<'a> LatLong<'a> {
         }
     }
 
-    /// Cuts an edge at parallels and meridians, and adds the area under its pieces. `window` has the first row and column
-    /// of the cells, and the number of their columns.
+    /// Cuts an edge at parallels and meridians, and adds the area under its pieces. `window` has the first row and
+    /// column of the cells, and the number of their columns.
     #[inline]
     fn add_edge(
         &self,

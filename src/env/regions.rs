@@ -1,8 +1,8 @@
-//! The environment as 64 regions of equal solid angle, each summed up in a few numbers: how much it sends, from where, and
-//! how far that is spread.
+//! The environment as 64 regions of equal solid angle, each summed up in a few numbers: how much it sends, from where,
+//! and how far that is spread.
 //!
-//! The regions are the texels of one coarse level of the pyramid. A region is weighed as a cone around the direction in which
-//! its light is centered: a sun in a region is found where it stands, not in the middle of the region.
+//! The regions are the texels of one coarse level of the pyramid. A region is weighed as a cone around the direction in
+//! which its light is centered: a sun in a region is found where it stands, not in the middle of the region.
 
 use alloc::boxed::Box;
 
@@ -19,8 +19,8 @@ use crate::warp::equal_area::{SPHERE, sphere_to_square, square_to_sphere};
 
 /// Base-2 logarithm of the number of regions a side. *Format*: the arrays of [`RegionMoments`] have this length.
 ///
-/// Larger: weights that follow the receiver's cosine more closely, each step of four times the cost. Smaller: more samples
-/// below the horizon.
+/// Larger: weights that follow the receiver's cosine more closely, each step of four times the cost. Smaller: more
+/// samples below the horizon.
 pub(crate) const REGION_DEPTH: u32 = 3;
 
 /// Number of regions. *Format*, as [`REGION_DEPTH`].
@@ -37,8 +37,8 @@ const SUMMED_DEPTHS: (u32, u32) = (6, 8);
 /// Larger: more of what is below the horizon keeps a weight. Smaller: light could be taken for dark.
 const TEXEL_REACH: f32 = 4.6;
 
-/// Factor on sines of cones, for normals that are not quite of unit length. *Proved*: these are within 1e-3, and rounding is
-/// far below.
+/// Factor on sines of cones, for normals that are not quite of unit length. *Proved*: these are within 1e-3, and
+/// rounding is far below.
 ///
 /// Larger: more regions keep a weight below the horizon. Smaller: light at the horizon could be lost.
 const REACH_SLACK: f32 = 1.005;
@@ -54,8 +54,8 @@ const LEAST_SHARE: f32 = 0.01;
 /// Larger: a sun at the horizon is blurred. Smaller: at zero, a cone has no mean.
 const LEAST_SPREAD: f32 = 0.005;
 
-/// What each region sends, by arrays that a loop over all regions reads as vectors. Directions are those of the environment's
-/// frame, so that a rotation changes nothing.
+/// What each region sends, by arrays that a loop over all regions reads as vectors. Directions are those of the
+/// environment's frame, so that a rotation changes nothing.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(crate) struct RegionMoments {

@@ -165,8 +165,8 @@ fn check_order(start: usize, texels: &[FeatureTexel]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks one node of the tree over the bright features. Where each passes, they are one tree: the children of each share
-/// its nodes and its blocks.
+/// Checks one node of the tree over the bright features. Where each passes, they are one tree: the children of each
+/// share its nodes and its blocks.
 fn check_node(i: usize, nodes: &[FeatureNode], texels: &[FeatureTexel]) -> Result<(), Error> {
     let FeatureNode { axis, sin_radius, sin_spread, power, range, next, is_single } = nodes[i];
     let [start, stop] = range.map(|at| at as usize);

@@ -7,8 +7,8 @@ use glam::Vec3;
 use crate::math;
 
 /// Angle in radians (and its sine) between two axes below which they have no plane in common that could be relied on:
-/// *proved*, the error of the plane is below 1e-7 / 0.01 radians. The cone is then widened without a turn, by at most this
-/// angle, so that a larger value gives wider cones.
+/// *proved*, the error of the plane is below 1e-7 / 0.01 radians. The cone is then widened without a turn, by at most
+/// this angle, so that a larger value gives wider cones.
 const LEAST_ANGLE: f32 = 0.01;
 
 /// All directions within the half angle `theta` (radians, `[0, π]`) of a unit axis.

@@ -1,7 +1,8 @@
 //! Vertices and maps that move linearly over an interval, and what bounds their normals and determinants in between.
 //!
-//! Products of two or three linear functions of the time are polynomials, and a polynomial lies in the convex hull of its
-//! Bernstein coefficients (Farin 2002, section 4.3). So bounds over an interval are bounds of a few vectors or numbers.
+//! Products of two or three linear functions of the time are polynomials, and a polynomial lies in the convex hull of
+//! its Bernstein coefficients (Farin 2002, section 4.3). So bounds over an interval are bounds of a few vectors or
+//! numbers.
 
 use glam::{DMat3, DVec3};
 
@@ -16,8 +17,8 @@ pub(crate) fn area_vectors([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> [DVec3; 3]
     [a.cross(b), (a.cross(d) + c.cross(b)) * 0.5, c.cross(d)]
 }
 
-/// Returns the Bernstein coefficients of the matrix that maps area vectors, without its sign, where vectors are mapped by a
-/// matrix that moves from the first to the second: that of cofactors.
+/// Returns the Bernstein coefficients of the matrix that maps area vectors, without its sign, where vectors are mapped
+/// by a matrix that moves from the first to the second: that of cofactors.
 pub(crate) fn cofactors(start: &DMat3, end: &DMat3) -> [DMat3; 3] {
     let middle = (mixed_cofactors(start, end) + mixed_cofactors(end, start)) * 0.5;
     [mixed_cofactors(start, start), middle, mixed_cofactors(end, end)]

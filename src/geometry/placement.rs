@@ -5,16 +5,16 @@ use glam::{DMat3, DVec3, Vec3};
 use super::motion::between;
 use crate::math;
 
-/// Rounding granted to a bound on the length of a vector that was mapped. *Proved*: a bound in double precision is off by
-/// about 1e-14. Larger: bounds are wider without need.
+/// Rounding granted to a bound on the length of a vector that was mapped. *Proved*: a bound in double precision is off
+/// by about 1e-14. Larger: bounds are wider without need.
 const NORM_ROUNDING: f64 = 1e-9;
 
-/// Largest relative difference of the squared lengths of a map's axes, and largest cosine between two of them, for which the
-/// map counts as a rotation and a uniform scale. *Chosen*: products of single precision rotations are off by some 1e-7, and
-/// weights by moments are far less exact than this.
+/// Largest relative difference of the squared lengths of a map's axes, and largest cosine between two of them, for
+/// which the map counts as a rotation and a uniform scale. *Chosen*: products of single precision rotations are off by
+/// some 1e-7, and weights by moments are far less exact than this.
 ///
-/// Larger: the weights of clusters are those of the unscaled object where they need not be. Smaller: a rotation that was
-/// rounded pays for a general map.
+/// Larger: the weights of clusters are those of the unscaled object where they need not be. Smaller: a rotation that
+/// was rounded pays for a general map.
 const SIMILARITY_ROUNDING: f64 = 1e-4;
 
 /// An invertible affine map from an object's own space to the world.
@@ -111,8 +111,8 @@ fn squared_length(matrix: &DMat3) -> f64 {
 
 /// Returns a bound on the length of what a matrix makes of a unit vector, exact for similarities.
 ///
-/// The squared lengths are between the eigenvalues of `MᵀM`. With their mean m and `p² = ‖MᵀM - m‖² / 6`, the largest is
-/// `m + 2 p cos φ` for some angle (the trigonometric solution of the cubic).
+/// The squared lengths are between the eigenvalues of `MᵀM`. With their mean m and `p² = ‖MᵀM - m‖² / 6`, the largest
+/// is `m + 2 p cos φ` for some angle (the trigonometric solution of the cubic).
 pub(crate) fn norm(matrix: &DMat3) -> f64 {
     let square = matrix.transpose() * *matrix;
     let mean = squared_length(matrix) * (1.0 / 3.0);

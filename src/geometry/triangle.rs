@@ -58,8 +58,8 @@ pub(crate) fn intersect(vertices: [DVec3; 3], direction: Vec3) -> Option<[f32; 2
     (b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0).then_some([b1 as f32, b2 as f32])
 }
 
-/// Returns the barycentrics `b1`, `b2` of the point where the line from the origin along `direction` crosses the plane of a
-/// triangle, and the point's distance in units of `direction`. `None` where they are parallel.
+/// Returns the barycentrics `b1`, `b2` of the point where the line from the origin along `direction` crosses the plane
+/// of a triangle, and the point's distance in units of `direction`. `None` where they are parallel.
 #[inline(always)]
 pub(crate) fn cross_plane(vertices: [DVec3; 3], direction: DVec3) -> Option<([f64; 2], f64)> {
     let [a, b, c] = vertices;

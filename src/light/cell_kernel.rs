@@ -1,7 +1,7 @@
 //! The weights of the cells of a triangle for a shading point: all children of a cell in one loop over plain arrays.
 //!
-//! The loop serves the default [`Illumination`]; the others replace its geometry cell by cell. What is seen behind a portal
-//! is looked up for all cells at once. Whether a descent ends is asked of the chosen cell alone.
+//! The loop serves the default [`Illumination`]; the others replace its geometry cell by cell. What is seen behind a
+//! portal is looked up for all cells at once. Whether a descent ends is asked of the chosen cell alone.
 
 use core::f32::consts::FRAC_1_PI;
 
@@ -18,8 +18,8 @@ use crate::warp::equal_area::sphere_to_square_quickly;
 
 /// Ratio of squared radius to squared distance up to which the geometry is taken to be constant over a cell.
 ///
-/// Measured (docs/ACCURACY.md, "Near cells"). A larger value ends descents earlier and leaves variance near a triangle, a
-/// smaller one takes time.
+/// Measured (docs/ACCURACY.md, "Near cells"). A larger value ends descents earlier and leaves variance near a triangle,
+/// a smaller one takes time.
 const CONSTANT_GEOMETRY: f32 = 1.0 / 16.0;
 
 /// Ratio of the least to the largest cosine of the receiver in a cell from which the cosine is taken to be constant.
@@ -35,15 +35,15 @@ const LOW_COSINE: f32 = 1.0 / 16.0;
 /// Levels below the tree over the texture at which a descent ends whatever is left: without a tree, and with one, whose
 /// last cells are smaller.
 ///
-/// Chosen, not swept (docs/ACCURACY.md, "Wide steps"). Larger: each level is one more step next to the triangle and in front
-/// of small bright parts of the environment; on the window, a fourth changed the variance by less than a hundredth. Smaller:
-/// these are left to noise; with two, the window's energy-weighted variance under clouds doubled. Both were seen before
-/// triangles without a texture had a grid of their own. Now these come here only with another [`Illumination`], or with next
-/// to no solid angle.
+/// Chosen, not swept (docs/ACCURACY.md, "Wide steps"). Larger: each level is one more step next to the triangle and in
+/// front of small bright parts of the environment; on the window, a fourth changed the variance by less than a
+/// hundredth. Smaller: these are left to noise; with two, the window's energy-weighted variance under clouds doubled.
+/// Both were seen before triangles without a texture had a grid of their own. Now these come here only with another
+/// [`Illumination`], or with next to no solid angle.
 const MOST_LEVELS: [u32; 2] = [3, 2];
 
-/// Least weight of a cell that may send light. Proved: products with averages and radiances are made positive again, and
-/// nothing that matters is as small. Larger: more samples where nothing is expected.
+/// Least weight of a cell that may send light. Proved: products with averages and radiances are made positive again,
+/// and nothing that matters is as small. Larger: more samples where nothing is expected.
 const LEAST_WEIGHT: f32 = 1e-37;
 
 /// Rounding of a cell's center relative to the largest coordinate of a vertex, granted to the cone around the cell.
@@ -202,8 +202,8 @@ impl<'a, L: Lobe> CellKernel<'a, L> {
         self.lobe.is_about_constant(direction.to_array(), SPREAD_OF_RADIUS2 * self.view.radius2 * share / distance2)
     }
 
-    /// Whether the receiver's cosine is nearly constant over a cell, or too small to matter. The heights are those of the
-    /// cell's corners over the receiver's plane.
+    /// Whether the receiver's cosine is nearly constant over a cell, or too small to matter. The heights are those of
+    /// the cell's corners over the receiver's plane.
     #[inline(always)]
     fn has_constant_cosine(&self, [a, b, c]: [f32; 3]) -> bool {
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));

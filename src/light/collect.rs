@@ -432,8 +432,8 @@ impl<'a> LightCollection<'a> {
         }
     }
 
-    /// Returns the weight over one triangle: the tree over a function, built only if no triangle before has the same, or
-    /// the number of one over an image.
+    /// Returns the weight over one triangle: the tree over a function, built only if no triangle before has the same,
+    /// or the number of one over an image.
     fn weight(&mut self, mesh: &Mesh<'_>, indices: [u32; 3]) -> Result<AddedWeight, Error> {
         let texture = match mesh.weight {
             Weight::Constant(weight) => {

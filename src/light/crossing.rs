@@ -1,8 +1,9 @@
-//! Whether any ray meets at most one light that shines back along it. Then the density of a sample is that of its direction,
-//! and nothing else along the ray need be looked for.
+//! Whether any ray meets at most one light that shines back along it. Then the density of a sample is that of its
+//! direction, and nothing else along the ray need be looked for.
 //!
-//! Two arrangements are recognized: lights side by side in one plane, and lights on the surface of one convex body that all
-//! face into it, such as the windows of a room. A ray leaves a convex body once. Lamps without an extent are never crossed.
+//! Two arrangements are recognized: lights side by side in one plane, and lights on the surface of one convex body that
+//! all face into it, such as the windows of a room. A ray leaves a convex body once. Lamps without an extent are never
+//! crossed.
 
 use alloc::vec::Vec;
 
@@ -13,32 +14,34 @@ use crate::math::sqrt64;
 
 /// Most planes that lights may lie in. *Chosen*: a room has six.
 ///
-/// Larger: a build compares each light with more planes before it gives up. Smaller: bodies of many faces are not recognized.
+/// Larger: a build compares each light with more planes before it gives up. Smaller: bodies of many faces are not
+/// recognized.
 const MAX_PLANES: usize = 64;
 
 /// Most triangles of instances that are looked at one by one. *Chosen*: the windows of a large house.
 ///
-/// Larger: builds and refits of scenes of many instances take longer. Smaller: rooms with more windows are not recognized.
+/// Larger: builds and refits of scenes of many instances take longer. Smaller: rooms with more windows are not
+/// recognized.
 const MOST_PLACED: usize = 4096;
 
-/// Largest distance of a vertex from a plane that it counts as lying in, relative to the coordinates of both. *Chosen*: rounding
-/// to `f32` moves a vertex by at most 1.04e-7 of them (√3 · 2⁻²⁴). A ray that meets two lights of what counts as one plane runs
-/// along both, at an angle of at most this distance over their size.
+/// Largest distance of a vertex from a plane that it counts as lying in, relative to the coordinates of both. *Chosen*:
+/// rounding to `f32` moves a vertex by at most 1.04e-7 of them (√3 · 2⁻²⁴). A ray that meets two lights of what counts
+/// as one plane runs along both, at an angle of at most this distance over their size.
 ///
 /// Larger: lights would count as one plane that are not. Smaller: a turned wall would not, as its vertices are rounded.
 const PLANE_ROUNDING: f64 = 2.5e-7;
 
-/// Largest overlap of two lights in one plane that counts as none, relative to the smaller one. *Chosen*: its share of the
-/// light is below the rounding of a density.
+/// Largest overlap of two lights in one plane that counts as none, relative to the smaller one. *Chosen*: its share of
+/// the light is below the rounding of a density.
 ///
 /// Larger: overlaps would be ignored. Smaller: neighbors with rounded vertices would count as overlapping.
 const OVERLAP_ROUNDING: f64 = 1e-6;
 
-/// Most pairs of lights that are compared, for each light. *Chosen*: in a wall of n by n windows, a light is compared with about
-/// n others of its column.
+/// Most pairs of lights that are compared, for each light. *Chosen*: in a wall of n by n windows, a light is compared
+/// with about n others of its column.
 ///
-/// Larger: builds of large walls take longer; with 256, up to half a second for a million lights. Smaller: large walls are not
-/// recognized.
+/// Larger: builds of large walls take longer; with 256, up to half a second for a million lights. Smaller: large walls
+/// are not recognized.
 const MAX_PAIRS: usize = 256;
 
 /// A plane that lights lie in.

@@ -1,8 +1,8 @@
 //! Distant lights as a sampler keeps them: in no tree, as they have no place, but in groups of like directions.
 //!
-//! What a distant light sends to a shading point is known without noise: its irradiance times the receiver's weight of its
-//! direction, or of all directions of its cap. Up to [`MOST_GROUPS`] lights are a group each, and are weighed one by one.
-//! Of more lights, each group holds neighbors in direction, and is weighed as a whole first.
+//! What a distant light sends to a shading point is known without noise: its irradiance times the receiver's weight of
+//! its direction, or of all directions of its cap. Up to [`MOST_GROUPS`] lights are a group each, and are weighed one
+//! by one. Of more lights, each group holds neighbors in direction, and is weighed as a whole first.
 
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, PI};
@@ -24,17 +24,18 @@ use crate::warp::spherical_cap::SphericalCap;
 /// Larger: shading points weigh more lights one by one. Smaller: of few lights already, some share a group.
 pub(crate) const MOST_GROUPS: usize = 32;
 
-/// Least share of what a cap sends if all of it is above the horizon, kept by a cap of which anything is. *Chosen*: it stands
-/// in for what rounding may take from the difference of like numbers.
+/// Least share of what a cap sends if all of it is above the horizon, kept by a cap of which anything is. *Chosen*: it
+/// stands in for what rounding may take from the difference of like numbers.
 ///
 /// Larger: samples where the light is all but set. Smaller: rounding shows there.
 const LEAST_SHARE: f64 = 1e-9;
 
-/// Rounding of a direction to single precision. *Proved*: a component is off by at most 6e-8. A larger one gives densities to
-/// directions beside a light.
+/// Rounding of a direction to single precision. *Proved*: a component is off by at most 6e-8. A larger one gives
+/// densities to directions beside a light.
 const DIRECTION_ROUNDING: f64 = 2e-7;
 
-/// Steps of the square of all directions in which lights are sorted, a side. Affects which lights share a group. *Chosen*.
+/// Steps of the square of all directions in which lights are sorted, a side. Affects which lights share a group.
+/// *Chosen*.
 const SORTING_STEPS: f32 = 1024.0;
 
 /// A distant light that can send something.
@@ -188,8 +189,8 @@ impl DistantView {
         Some(direction.as_vec3()).filter(|direction| !self.is_below_horizon(*direction))
     }
 
-    /// Returns the density per solid angle with which [`Self::draw`] draws a direction that leads to the light; 1 for a light
-    /// without an extent.
+    /// Returns the density per solid angle with which [`Self::draw`] draws a direction that leads to the light; 1 for a
+    /// light without an extent.
     pub(crate) fn pdf(&self, direction: Vec3) -> f64 {
         if self.is_below_horizon(direction) {
             return 0.0;
@@ -222,9 +223,9 @@ fn weigh_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
     }
 }
 
-/// Integral of the cosine to a unit normal, clamped at zero, over the directions of a cap: what is below the horizon is cut off
-/// (Snyder 1996, "Area light sources for real-time graphics"; here in the form of Lagarde and de Rousiers 2014, "Moving
-/// Frostbite to physically based rendering", section 4.7).
+/// Integral of the cosine to a unit normal, clamped at zero, over the directions of a cap: what is below the horizon is
+/// cut off (Snyder 1996, "Area light sources for real-time graphics"; here in the form of Lagarde and de Rousiers 2014,
+/// "Moving Frostbite to physically based rendering", section 4.7).
 fn cosine_over_cap(cap: &SphericalCap, normal: DVec3) -> f64 {
     if cap.cos < 0.0 {
         // The hemisphere without the rest of the sphere.

@@ -30,8 +30,8 @@ pub(crate) struct EmittedRay {
     pub(crate) normal: Vec3,
     /// Unit vector.
     pub(crate) direction: Vec3,
-    /// Density per area perpendicular to the direction and per solid angle; for a lamp without an extent, per solid angle
-    /// alone.
+    /// Density per area perpendicular to the direction and per solid angle; for a lamp without an extent, per solid
+    /// angle alone.
     pub(crate) pdf: f64,
 }
 
@@ -43,8 +43,8 @@ impl EmittedRay {
 }
 
 impl LightsView<'_> {
-    /// Draws a ray in which light leaves a light in all directions; `None` for a light that is switched off. `side` chooses
-    /// the side of a light of two sides.
+    /// Draws a ray in which light leaves a light in all directions; `None` for a light that is switched off. `side`
+    /// chooses the side of a light of two sides.
     pub(crate) fn emit(
         &self,
         leaf: LightLeaf,
@@ -138,8 +138,8 @@ pub(super) fn per_direction(two_sided: bool) -> f64 {
     f64::from(if two_sided { 0.5 * FRAC_1_PI } else { FRAC_1_PI })
 }
 
-/// Returns a ray from a point of a surface whose direction is distributed by the cosine to one of its sides. The density is
-/// that of the point times [`per_direction`].
+/// Returns a ray from a point of a surface whose direction is distributed by the cosine to one of its sides. The
+/// density is that of the point times [`per_direction`].
 pub(super) fn cosine_ray(position: DVec3, normal: Vec3, is_back: bool, u: [Variate; 2], pdf: f64) -> EmittedRay {
     let direction = cosine_direction(if is_back { -normal } else { normal }, u);
     EmittedRay { point: LocalPoint::from_direction(direction), position, normal, direction, pdf }

@@ -39,7 +39,8 @@ impl<'a> Energies<'a> {
         parallel::sum(count, |i| self.energy(light(i)))
     }
 
-    /// Returns weight times what it is multiplied by to compete ([`LightKind::area`]), times mean radiance for a portal. Exactly zero where nothing is emitted.
+    /// Returns weight times what it is multiplied by to compete ([`LightKind::area`]), times mean radiance for a
+    /// portal. Exactly zero where nothing is emitted.
     pub(crate) fn energy(&self, light: Light<'_>) -> f64 {
         if let Light::Instance(placed) = light {
             let [flux, portal] = placed.energies();

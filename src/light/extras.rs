@@ -1,5 +1,5 @@
-//! What few scenes have: light groups, profiles, distant lights and motion, in one buffer, so that all others carry one slice
-//! more.
+//! What few scenes have: light groups, profiles, distant lights and motion, in one buffer, so that all others carry one
+//! slice more.
 //!
 //! The buffer is empty where a scene has none of them. Otherwise it is a [`Header`] and then the arrays that it counts.
 
@@ -119,8 +119,8 @@ impl<'a> Extras<'a> {
         self.0.get(..HEADER).map_or_else(Header::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
     }
 
-    /// Returns so many words of an array, after so many of the arrays before. Words that are not there, which validation
-    /// refuses, give none.
+    /// Returns so many words of an array, after so many of the arrays before. Words that are not there, which
+    /// validation refuses, give none.
     #[inline]
     fn words(self, before: usize, count: usize) -> &'a [u32] {
         let start = HEADER + before;
@@ -173,7 +173,8 @@ impl<'a> Extras<'a> {
         Motion(self.0.get(start..).unwrap_or(&[]))
     }
 
-    /// Checks that the arrays are where the header says, and what they hold. `leaves` is the number of lights in the tree.
+    /// Checks that the arrays are where the header says, and what they hold. `leaves` is the number of lights in the
+    /// tree.
     pub(super) fn validate(self, leaves: usize) -> Result<(), Error> {
         if self.is_empty() {
             return Ok(());
@@ -229,8 +230,8 @@ pub(super) fn add_groups(extras: &mut Vec<u32>, leaves: usize) -> bool {
     is_new
 }
 
-/// Makes room for the light groups of so many leaves, if leaves have light groups, and for more later. Those of the environment
-/// stay the last.
+/// Makes room for the light groups of so many leaves, if leaves have light groups, and for more later. Those of the
+/// environment stay the last.
 pub(super) fn resize_groups(extras: &mut Vec<u32>, leaves: usize) {
     let groups = Extras(extras).header().groups as usize;
     if groups > 0 && groups < leaves + 1 {

@@ -1,8 +1,8 @@
 //! Points of a triangle without a texture by a density that is linear over its area.
 //!
-//! Where a triangle is small for its distance, what its points send to the receiver is almost a linear function of their
-//! barycentrics, given by its three corners. (Hart et al. 2020, "Practical Product Sampling by Fitting and Composing Warps",
-//! warp a square in this way.) No direction is computed, so that a sample costs next to nothing.
+//! Where a triangle is small for its distance, what its points send to the receiver is almost a linear function of
+//! their barycentrics, given by its three corners. (Hart et al. 2020, "Practical Product Sampling by Fitting and
+//! Composing Warps", warp a square in this way.) No direction is computed, so that a sample costs next to nothing.
 
 use glam::Vec3;
 
@@ -16,13 +16,14 @@ use crate::warp::triangle::{linear_pdf, square_to_linear_triangle};
 
 /// Ratio of squared radius to squared distance up to which the density is linear.
 ///
-/// Measured (docs/ACCURACY.md, "A linear density"). Larger: more triangles are sampled at a low cost, with more variance.
+/// Measured (docs/ACCURACY.md, "A linear density"). Larger: more triangles are sampled at a low cost, with more
+/// variance.
 const LINEAR_GEOMETRY: f32 = 1.0 / 8.0;
 
 /// Least ratio of the weights of two corners.
 ///
-/// Chosen, not swept. Larger: more triangles at the horizon, where the cosine varies, are divided into cells. Smaller: points
-/// far from linear, and more steps of the map from the square.
+/// Chosen, not swept. Larger: more triangles at the horizon, where the cosine varies, are divided into cells. Smaller:
+/// points far from linear, and more steps of the map from the square.
 const LEAST_CORNER_RATIO: f32 = 1.0 / 8.0;
 
 /// A density that is linear over the area of a triangle.

@@ -72,8 +72,8 @@ impl<'a> Mesh<'a> {
         Self::new(MeshKind::Emitter, positions, indices)
     }
 
-    /// Returns a mesh that fills an opening to the environment. Its weight is the transmittance, 1 until [`Self::weight`]
-    /// sets it.
+    /// Returns a mesh that fills an opening to the environment. Its weight is the transmittance, 1 until
+    /// [`Self::weight`] sets it.
     pub const fn portal(positions: &'a [Vec3], indices: &'a [[u32; 3]]) -> Self {
         Self::new(MeshKind::Portal, positions, indices)
     }
@@ -91,12 +91,12 @@ impl<'a> Mesh<'a> {
         }
     }
 
-    /// Makes the vertices move while the shutter is open: from their positions at its start, the time 0, along straight lines to
-    /// these at its end, the time 1, one a vertex.
+    /// Makes the vertices move while the shutter is open: from their positions at its start, the time 0, along straight
+    /// lines to these at its end, the time 1, one a vertex.
     ///
-    /// Samples and densities are those of the time of the shading point ([`ShadingPoint::at_time`](crate::ShadingPoint::at_time)),
-    /// and exact at each. A triangle that has no area at some time sends nothing then. Texture coordinates and weights do not
-    /// change.
+    /// Samples and densities are those of the time of the shading point
+    /// ([`ShadingPoint::at_time`](crate::ShadingPoint::at_time)), and exact at each. A triangle that has no area at
+    /// some time sends nothing then. Texture coordinates and weights do not change.
     pub const fn moving_to(mut self, end: &'a [Vec3]) -> Self {
         self.end = Some(end);
         self
@@ -120,8 +120,9 @@ impl<'a> Mesh<'a> {
         self
     }
 
-    /// Sets the light groups that the mesh is in, a set of bits; all by default. It sends light to the points that receive any of
-    /// them ([`ShadingPoint::with_groups`](crate::ShadingPoint::with_groups)). Photons leave it in any case.
+    /// Sets the light groups that the mesh is in, a set of bits; all by default. It sends light to the points that
+    /// receive any of them ([`ShadingPoint::with_groups`](crate::ShadingPoint::with_groups)). Photons leave it in any
+    /// case.
     pub const fn groups(mut self, groups: u32) -> Self {
         self.groups = groups;
         self
@@ -163,8 +164,8 @@ impl<'a> MeshUpdate<'a> {
         self
     }
 
-    /// Moves the vertices as [`Self::moved`] does, to where they are at the start of the shutter interval, and makes them move to
-    /// others at its end ([`Mesh::moving_to`]).
+    /// Moves the vertices as [`Self::moved`] does, to where they are at the start of the shutter interval, and makes
+    /// them move to others at its end ([`Mesh::moving_to`]).
     pub const fn moving(mut self, positions: &'a [Vec3], end: &'a [Vec3], indices: &'a [[u32; 3]]) -> Self {
         (self.triangles, self.end) = (Some((positions, indices)), Some(end));
         self

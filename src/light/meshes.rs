@@ -1,7 +1,7 @@
 //! Which mesh a light belongs to, and what its weight has been multiplied by since the build.
 
-/// Returns the mesh that holds a triangle, by the numbers at which the meshes start (and, at last, the one at which they
-/// end).
+/// Returns the mesh that holds a triangle, by the numbers at which the meshes start (and, at last, the one at which
+/// they end).
 pub(super) fn mesh_of(starts: &[u32], index: u32) -> usize {
     let last = starts.len().saturating_sub(2);
     let total = starts.last().map_or(1, |&end| u64::from(end.max(1)));

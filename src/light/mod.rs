@@ -1,8 +1,8 @@
 //! The lights: one file a kind, one enum, and the buffers that hold the lights of a scene.
 //!
-//! Everything that depends on the kind of a light is a method of [`LightKind`] (the light itself) or of [`LightViewKind`]
-//! (the light as seen from a shading point). Above this level a light is the number of a leaf. A new kind is a new file, and
-//! a variant in both enums.
+//! Everything that depends on the kind of a light is a method of [`LightKind`] (the light itself) or of
+//! [`LightViewKind`] (the light as seen from a shading point). Above this level a light is the number of a leaf. A new
+//! kind is a new file, and a variant in both enums.
 
 mod cell_kernel;
 mod collect;
@@ -96,7 +96,8 @@ buffers! {
         cells: CellNode = b"CELL" version 2,
         /// Where the triangles of each mesh start in `leaf_of`, and their number at the end.
         meshes: u32 = b"MESH" version 1,
-        /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`]; then the leaf of every lamp or [`NO_LEAF`].
+        /// Leaf of every triangle that was added, [`NO_LEAF`] or [`NO_AREA`]; then the leaf of every lamp or
+        /// [`NO_LEAF`].
         leaf_of: u32 = b"LEAF" version 1,
         /// What the weights of each mesh have been multiplied by since the build. Empty if they have not.
         scales: f32 = b"SCAL" version 1,
@@ -129,8 +130,8 @@ pub(crate) enum LightView<'a> {
     Lamp(LampView),
 }
 
-/// A point of a light in the light's own terms: the barycentric coordinates of a point of a triangle, or the direction from
-/// the shading point to a point of a lamp.
+/// A point of a light in the light's own terms: the barycentric coordinates of a point of a triangle, or the direction
+/// from the shading point to a point of a lamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LocalPoint([u32; 3]);
 
@@ -174,8 +175,8 @@ pub(crate) struct LightPoint {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DrawnPoint {
     pub(crate) point: LocalPoint,
-    /// Relative to the shading point. The lattice's own point, except where the lattice is too coarse to tell directions
-    /// apart.
+    /// Relative to the shading point. The lattice's own point, except where the lattice is too coarse to tell
+    /// directions apart.
     pub(crate) relative: DVec3,
     /// Density per solid angle with which the point is drawn; the probability of a lamp without an extent, which is 1.
     pub(crate) pdf: f64,
@@ -192,8 +193,8 @@ pub(crate) trait LightKind {
     /// Returns the average weight: radiance of an emitter, transmittance of a portal, intensity of what has no extent.
     fn weight(&self) -> f32;
 
-    /// Returns the area that light leaves from, once for lights of two sides. For a light without an extent, the number that
-    /// makes its weight compete.
+    /// Returns the area that light leaves from, once for lights of two sides. For a light without an extent, the number
+    /// that makes its weight compete.
     fn area(&self) -> f32;
 
     /// Returns bounds and moments. `energy` gives the energy by the area; `directional` says whether it depends on the
@@ -203,8 +204,8 @@ pub(crate) trait LightKind {
     /// Whether anything can travel from the light to the shading point.
     fn is_visible(&self, x: &ShadingPoint) -> bool;
 
-    /// Returns the irradiance from a light of unit radiance, per area of the light, exact as far as `f32` goes. Rounding may
-    /// make it zero.
+    /// Returns the irradiance from a light of unit radiance, per area of the light, exact as far as `f32` goes.
+    /// Rounding may make it zero.
     fn irradiance_per_area(&self, x: &ShadingPoint) -> f32;
 
     /// Returns the point where a ray crosses the light, if it does. `direction` need not be a unit vector.
@@ -213,7 +214,8 @@ pub(crate) trait LightKind {
 
 /// What a light of any kind says of itself to a shading point.
 pub(crate) trait LightViewKind {
-    /// Draws a point of the light; `None` where nothing can arrive from the part of the light that the variates lead to.
+    /// Draws a point of the light; `None` where nothing can arrive from the part of the light that the variates lead
+    /// to.
     fn sample(&self, u: [Variate; 2]) -> Option<DrawnPoint>;
 
     /// Returns the density per solid angle with which [`Self::sample`] draws a point, if that is positive.
@@ -228,8 +230,8 @@ pub(crate) trait LightViewKind {
     /// Returns the unit normal of the front side in a point relative to the shading point.
     fn normal(&self, point: DVec3) -> Vec3;
 
-    /// Returns the solid angle at the shading point per area of the light at this place: `cos θl / d²`; 1 for a light without
-    /// an extent.
+    /// Returns the solid angle at the shading point per area of the light at this place: `cos θl / d²`; 1 for a light
+    /// without an extent.
     fn solid_angle_per_area(&self, point: DVec3) -> f64;
 
     /// Returns an estimate of the irradiance from the light if this is its weight. Zero only if nothing can arrive.
@@ -426,8 +428,8 @@ impl<'a> LightsView<'a> {
         prefetch(&self.records[leaf as usize]);
     }
 
-    /// Returns a light as seen from a shading point; `None` if nothing can arrive from it. `environment` is what portals
-    /// show, if that depends on the direction.
+    /// Returns a light as seen from a shading point; `None` if nothing can arrive from it. `environment` is what
+    /// portals show, if that depends on the direction.
     #[inline(always)]
     pub(crate) fn view<'v>(
         &self,
@@ -506,8 +508,8 @@ impl<'a> LightsView<'a> {
         SampledLight::Triangle(Hit { triangle, barycentrics: point.lattice().to_barycentrics(), instance })
     }
 
-    /// Returns the point of a lamp in a direction; `None` for a lamp without an extent, or one that emits nothing or was never
-    /// added.
+    /// Returns the point of a lamp in a direction; `None` for a lamp without an extent, or one that emits nothing or
+    /// was never added.
     pub(crate) fn point_of_lamp(&self, id: LightId, direction: Vec3) -> Option<LightPoint> {
         let leaf = self.leaf_of_lamp(id)?;
         let Light::Lamp(lamp) = self.light(leaf) else { return None };

@@ -1,8 +1,8 @@
 //! Profiles: tables of the intensity of a luminaire by direction (goniometric diagrams, photometric webs).
 //!
-//! Between the angles of the table the intensity is bilinear, around the axis it is periodic, and outside of the vertical
-//! angles it is zero. What is kept of a profile is the table, the mean intensity, the vertical angle beyond which nothing is
-//! sent, and sums over the cells of the table by which rays of light are drawn.
+//! Between the angles of the table the intensity is bilinear, around the axis it is periodic, and outside of the
+//! vertical angles it is zero. What is kept of a profile is the table, the mean intensity, the vertical angle beyond
+//! which nothing is sent, and sums over the cells of the table by which rays of light are drawn.
 
 use alloc::vec::Vec;
 use core::f32::consts::{PI, TAU};
@@ -18,16 +18,16 @@ use crate::record::ProfileId;
 /// Most angles of a profile, vertical or horizontal. *Format*: numbers of cells are exact in single precision.
 const MOST_ANGLES: usize = 2048;
 
-/// Values in front of a table: numbers of vertical and horizontal angles, mean intensity, and largest vertical angle at which
-/// anything is sent. *Format.*
+/// Values in front of a table: numbers of vertical and horizontal angles, mean intensity, and largest vertical angle at
+/// which anything is sent. *Format.*
 pub(super) const HEADER: usize = 4;
 
-/// Widening of the largest vertical angle, in radians. *Proved*: covers the rounding of angles to single precision, 2e-7. A
-/// larger one culls less.
+/// Widening of the largest vertical angle, in radians. *Proved*: covers the rounding of angles to single precision,
+/// 2e-7. A larger one culls less.
 pub(super) const REACH_MARGIN: f32 = 1e-6;
 
-/// The intensity of a luminaire by direction, borrowed from the host: a goniometric diagram, as files of the format IESNA LM-63
-/// hold it.
+/// The intensity of a luminaire by direction, borrowed from the host: a goniometric diagram, as files of the format
+/// IESNA LM-63 hold it.
 ///
 /// ```
 /// use fanlight::glam::Vec3;
@@ -48,13 +48,14 @@ pub(super) const REACH_MARGIN: f32 = 1e-6;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile<'a> {
-    /// Angles from the axis in radians, at least two: from 0 to π, in ascending order. Nothing is sent before the first and
-    /// beyond the last.
+    /// Angles from the axis in radians, at least two: from 0 to π, in ascending order. Nothing is sent before the first
+    /// and beyond the last.
     pub vertical: &'a [f32],
-    /// Angles around the axis in radians, at least one: from 0 to less than 2π, in ascending order. The last is next to the
-    /// first. With a single one, the intensity depends on the vertical angle alone.
+    /// Angles around the axis in radians, at least one: from 0 to less than 2π, in ascending order. The last is next to
+    /// the first. With a single one, the intensity depends on the vertical angle alone.
     pub horizontal: &'a [f32],
-    /// Radiant intensities, not negative: those of all horizontal angles for the first vertical angle, then for the next.
+    /// Radiant intensities, not negative: those of all horizontal angles for the first vertical angle, then for the
+    /// next.
     pub intensities: &'a [f32],
 }
 
@@ -283,8 +284,8 @@ impl<'a> Profiles<'a> {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Returns a profile or a projection by its number, if its values are as many as they should be. The number of rows of a
-    /// projection is negative.
+    /// Returns a profile or a projection by its number, if its values are as many as they should be. The number of rows
+    /// of a projection is negative.
     pub(super) fn get(&self, profile: u32) -> Option<Distribution<'a>> {
         let starts = self.starts.get(profile as usize..)?;
         let [start, end, ..] = starts else { return None };

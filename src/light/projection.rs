@@ -1,8 +1,9 @@
 //! Projections: images of the intensity of a light over its field of view, as a slide projector has one.
 //!
-//! The image lies on a plane in front of the light, so that it is a rectangular pyramid of directions. Rays of light are drawn
-//! by its texels: a row, then a texel in the row, each by the mean intensity times the solid angle, then a point of the texel
-//! uniformly. On the plane at the distance 1, an area is seen under its size times the third power of the cosine to the axis.
+//! The image lies on a plane in front of the light, so that it is a rectangular pyramid of directions. Rays of light
+//! are drawn by its texels: a row, then a texel in the row, each by the mean intensity times the solid angle, then a
+//! point of the texel uniformly. On the plane at the distance 1, an area is seen under its size times the third power
+//! of the cosine to the axis.
 
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, PI};
@@ -16,7 +17,8 @@ use crate::record::{Filter, ProfileId};
 /// Most texels along an edge. *Format*: sums over a row are exact enough in single precision for [`LEAST_SHARE`].
 const MOST_TEXELS: usize = 2048;
 
-/// Values of a projection between the header and the texels: tangents of half the angles of view, and the filter. *Format.*
+/// Values of a projection between the header and the texels: tangents of half the angles of view, and the filter.
+/// *Format.*
 const VIEW: usize = 3;
 
 /// Range of the angles of view, in radians. *Chosen*: tangents of half of them are well within single precision.
@@ -25,17 +27,17 @@ const ANGLES: [f32; 2] = [1e-3, 3.1];
 /// Range of the tangents of half the angles of view. *Proved*: holds those of [`ANGLES`].
 const TANGENTS: [f32; 2] = [4e-4, 49.0];
 
-/// Least share of a row among all rows, and of a texel in its row, if it is lit. *Proved*: above the rounding of sums up to 1 to
-/// single precision, 6e-8, so that no lit texel is without a share.
+/// Least share of a row among all rows, and of a texel in its row, if it is lit. *Proved*: above the rounding of sums
+/// up to 1 to single precision, 6e-8, so that no lit texel is without a share.
 ///
 /// Larger: more rays from dark texels.
 const LEAST_SHARE: f64 = 2.4e-7;
 
 /// An image of radiant intensities that a light projects, borrowed from the host.
 ///
-/// A [`ProfileLight`](crate::ProfileLight) may have one in the place of a [`Profile`](crate::Profile). Its axis is the middle of
-/// the image, [`facing`](crate::ProfileLight::facing) is the direction of the image's right edge as seen along the light, and rows
-/// go down.
+/// A [`ProfileLight`](crate::ProfileLight) may have one in the place of a [`Profile`](crate::Profile). Its axis is the
+/// middle of the image, [`facing`](crate::ProfileLight::facing) is the direction of the image's right edge as seen
+/// along the light, and rows go down.
 ///
 /// ```
 /// use fanlight::glam::Vec3;
@@ -69,8 +71,8 @@ pub struct Projection<'a> {
 }
 
 impl Projection<'_> {
-    /// Returns the intensity at a point of the image, from `[0, 0]` at the upper left to `[1, 1]` at the lower right; zero
-    /// outside.
+    /// Returns the intensity at a point of the image, from `[0, 0]` at the upper left to `[1, 1]` at the lower right;
+    /// zero outside.
     #[must_use]
     pub fn intensity(&self, point: [f64; 2]) -> f32 {
         // NaN fails.
@@ -317,7 +319,8 @@ impl<'a> ProjectionTable<'a> {
     }
 }
 
-/// Chooses one of several by its share, given the sums of the shares. Returns it with what is left of the random number.
+/// Chooses one of several by its share, given the sums of the shares. Returns it with what is left of the random
+/// number.
 fn choose(sums: &[f32], u: f64) -> (usize, f64) {
     let Some(&total) = sums.last() else { return (0, u) };
     // The first whose end is beyond: never one without a share.

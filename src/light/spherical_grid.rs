@@ -1,15 +1,15 @@
 //! Sampling a triangle without a texture by directions: a grid of cells of equal solid angle on what is visible of it.
 //!
-//! The part of the triangle above the receiver's horizon is one or two spherical triangles ([`VisiblePart`]). The equal-area
-//! map from the unit square to each ([`SphericalTriangle`](crate::warp::SphericalTriangle)) makes a grid of 8 x 8 cells,
-//! whose columns meet in one corner. (Two triangles share the columns of the first step.) Cells are chosen by solid angle
-//! times the receiver's weight and the environment's radiance in their central directions; one vector loop weighs all 64.
-//! While the environment or the receiver's lobe varies over the chosen cell, it is divided again in the same way, in up to
-//! three steps in all. Of the geometry, only the receiver's weight varies within a cell: the density does not depend on how
-//! near the triangle is.
+//! The part of the triangle above the receiver's horizon is one or two spherical triangles ([`VisiblePart`]). The
+//! equal-area map from the unit square to each ([`SphericalTriangle`](crate::warp::SphericalTriangle)) makes a grid of
+//! 8 x 8 cells, whose columns meet in one corner. (Two triangles share the columns of the first step.) Cells are chosen
+//! by solid angle times the receiver's weight and the environment's radiance in their central directions; one vector
+//! loop weighs all 64. While the environment or the receiver's lobe varies over the chosen cell, it is divided again in
+//! the same way, in up to three steps in all. Of the geometry, only the receiver's weight varies within a cell: the
+//! density does not depend on how near the triangle is.
 //!
-//! Sampling and density share [`descend`](SphericalGrid::descend): a [`GridGuide`] draws the way or follows a point. A drawn
-//! direction is rounded to a point of the triangle's lattice, and the density is that of the rounded point.
+//! Sampling and density share [`descend`](SphericalGrid::descend): a [`GridGuide`] draws the way or follows a point. A
+//! drawn direction is rounded to a point of the triangle's lattice, and the density is that of the rounded point.
 
 use glam::{DVec3, Vec3};
 
@@ -30,11 +30,11 @@ const HALF: usize = SIDE / 2;
 /// Cells of a step. Lane `row * SIDE + column`: sums over the rows are sums of vectors.
 const LANES: usize = SIDE * SIDE;
 
-/// Most steps. *Measured* on the window under clouds (docs/ACCURACY.md, "Wide steps"): the third takes the energy-weighted
-/// variance from 0.065 to 0.033, for less than 1 % more time.
+/// Most steps. *Measured* on the window under clouds (docs/ACCURACY.md, "Wide steps"): the third takes the
+/// energy-weighted variance from 0.065 to 0.033, for less than 1 % more time.
 ///
-/// Larger: cells smaller than the texels of most environments. Smaller: small bright parts of the environment are left to
-/// noise.
+/// Larger: cells smaller than the texels of most environments. Smaller: small bright parts of the environment are left
+/// to noise.
 const MAX_STEPS: usize = 3;
 
 /// Bits of a coordinate of the unit square that cells are told by. *Proved*: three steps use 9 of them.
@@ -48,8 +48,8 @@ const FIXED_BITS: u32 = 30;
 /// Larger: more of the small triangles are divided by area. Smaller: densities could be those of a neighboring cell.
 const LEAST_SOLID_ANGLE: f64 = 1e-6;
 
-/// Ratio of a chord to the largest distance from the pole up to which radii of cells are bounded. *Proved*: an arc grows by
-/// at most 1.4003 times its chord there.
+/// Ratio of a chord to the largest distance from the pole up to which radii of cells are bounded. *Proved*: an arc
+/// grows by at most 1.4003 times its chord there.
 ///
 /// Larger: bounds would not hold. Smaller: large cells are taken for everything.
 const LARGEST_CHORD: f32 = 1.4;
@@ -130,8 +130,8 @@ impl GridPoint {
 
 /// What leads a descent from a cell to one of its cells.
 trait GridGuide {
-    /// Chooses a column by the sums of the columns, then a row. Returns both with their probability; `None` where that is
-    /// zero. A step has `1 << column_bits` columns of each spherical triangle.
+    /// Chooses a column by the sums of the columns, then a row. Returns both with their probability; `None` where that
+    /// is zero. A step has `1 << column_bits` columns of each spherical triangle.
     fn choose(
         &mut self,
         cell: &GridCell,
@@ -242,8 +242,8 @@ impl Step {
 }
 
 impl<'a, L: Lobe> SphericalGrid<'a, L> {
-    /// Returns the grid of a triangle, with the lobe of the receiver; `None` where there is nothing above the horizon, or too
-    /// little of it.
+    /// Returns the grid of a triangle, with the lobe of the receiver; `None` where there is nothing above the horizon,
+    /// or too little of it.
     #[inline(always)]
     pub(super) fn new(view: &TriangleView<'a>, lobe: L) -> Option<Self> {
         let horizon = view.receiver.has_horizon().then(|| view.receiver_normal.as_dvec3());
@@ -265,7 +265,8 @@ impl<'a, L: Lobe> SphericalGrid<'a, L> {
         Some((self.visible.triangles()[cell.part].direction(cell.at([u, v])), cell, pdf))
     }
 
-    /// Returns the density per solid angle of a unit direction above the horizon. `drawn` may be a cell with its density.
+    /// Returns the density per solid angle of a unit direction above the horizon. `drawn` may be a cell with its
+    /// density.
     #[inline(always)]
     pub(super) fn pdf(&self, direction: DVec3, drawn: Option<(GridCell, f64)>) -> Option<f64> {
         let point = GridPoint::new(self.visible.locate(direction));
@@ -428,9 +429,9 @@ impl<'a, L: Lobe> SphericalGrid<'a, L> {
 
     /// Returns the texels whose filters hold all directions of each cell.
     ///
-    /// From the center of a cell to any other of its directions: along the center's column, over a chord that grows with the
-    /// square root of `v`; then across. There the end of the arc moves by at most δ, so that the chord changes by no more
-    /// than that, and the arc turns around the pole by at most γ.
+    /// From the center of a cell to any other of its directions: along the center's column, over a chord that grows
+    /// with the square root of `v`; then across. There the end of the arc moves by at most δ, so that the chord changes
+    /// by no more than that, and the arc turns around the pole by at most γ.
     #[inline(always)]
     fn cover(&self, environment: &EnvironmentView<'_>, cell: &GridCell, is_shared: bool, step: &Step) -> [u32; LANES] {
         let (mut ends, mut turns, mut chords) = ([0.0; SIDE], [0.0; SIDE], [0.0; SIDE]);

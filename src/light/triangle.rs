@@ -24,8 +24,8 @@ pub(crate) struct LightTriangle {
     pub(crate) vertices: [[f32; 3]; 3],
     /// The tree over its texture.
     pub(crate) root: Root,
-    /// Number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`]. With [`Self::LAMP`], all of
-    /// this is the record of a lamp, but with [`Self::MOVING`] as well, that of a triangle whose vertices move.
+    /// Number among all triangles that were added, and [`Self::TWO_SIDED`] and [`Self::PORTAL`]. With [`Self::LAMP`],
+    /// all of this is the record of a lamp, but with [`Self::MOVING`] as well, that of a triangle whose vertices move.
     pub(crate) index_and_flags: u32,
 }
 

@@ -26,15 +26,15 @@ pub(super) const FARTHEST_POINT: f32 = 1e15;
 
 /// A triangle is close if its squared radius is more than this many times the squared distance from its plane.
 ///
-/// Measured on star (docs/ACCURACY.md, "Where it is still weak"): it decides where the trees get a fifth of the samples next
-/// to bright features. Larger values miss points close to a card, smaller ones waste samples at a distance.
+/// Measured on star (docs/ACCURACY.md, "Where it is still weak"): it decides where the trees get a fifth of the samples
+/// next to bright features. Larger values miss points close to a card, smaller ones waste samples at a distance.
 const CLOSE_RATIO: f32 = 256.0;
 
-/// Ratio of the height over a triangle to its radius from which the lattice resolves directions: 8 units of the lattice.
-/// Chosen, not swept.
+/// Ratio of the height over a triangle to its radius from which the lattice resolves directions: 8 units of the
+/// lattice. Chosen, not swept.
 ///
-/// Larger: directions are drawn uniformly, with a relative deviation of 0.58, where they could be drawn by weight. Smaller:
-/// rounding to the lattice would bias samples.
+/// Larger: directions are drawn uniformly, with a relative deviation of 0.58, where they could be drawn by weight.
+/// Smaller: rounding to the lattice would bias samples.
 const RESOLVED_HEIGHT: f64 = 8.0 / 16_777_216.0;
 
 /// How far rounding to the lattice moves a point along both edges, in units of the edges. *Proved*: half a unit of the
@@ -79,8 +79,8 @@ pub(crate) struct TriangleView<'a> {
 }
 
 impl<'a> TriangleView<'a> {
-    /// Returns the view from a shading point, or `None` where nothing can arrive. `wrap` makes the view into what is wanted
-    /// before it is written anywhere: a view is large.
+    /// Returns the view from a shading point, or `None` where nothing can arrive. `wrap` makes the view into what is
+    /// wanted before it is written anywhere: a view is large.
     #[inline]
     pub(super) fn wrapped<V>(
         light: &LightTriangle,
@@ -128,8 +128,8 @@ impl<'a> TriangleView<'a> {
         Self::of_vertices(triangle.record, relative, front, x, illumination, cells, environment, wrap)
     }
 
-    /// Returns the view of a triangle by its vertices relative to the shading point and the normal of its front times twice
-    /// its area.
+    /// Returns the view of a triangle by its vertices relative to the shading point and the normal of its front times
+    /// twice its area.
     #[expect(clippy::too_many_arguments, reason = "a struct would be copied")]
     #[inline(always)]
     fn of_vertices<V>(
@@ -204,8 +204,8 @@ impl<'a> TriangleView<'a> {
         for_lobe!(self.receiver, lobe => InstructionSet::best().run(CellDescent { view: self, guide, lobe }))
     }
 
-    /// Returns the density per solid angle of a point of a cell that was chosen with this probability, `p_A d² / cos θl`.
-    /// `None` where it is not a positive number.
+    /// Returns the density per solid angle of a point of a cell that was chosen with this probability,
+    /// `p_A d² / cos θl`. `None` where it is not a positive number.
     #[inline]
     fn pdf_in(&self, cell: LatticeCell, cell_pmf: f64, point: Lattice) -> Option<f64> {
         let pdf_area = cell_pmf / (f64::from(self.area) * f64::from(cell.area()));
@@ -213,7 +213,8 @@ impl<'a> TriangleView<'a> {
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
 
-    /// Whether points are drawn by a linear density or by direction, where the solid angle allows it: without a texture.
+    /// Whether points are drawn by a linear density or by direction, where the solid angle allows it: without a
+    /// texture.
     #[inline]
     fn is_plain(&self) -> bool {
         self.root.node == LEAF && self.illumination == Illumination::ClampedVertices
@@ -365,8 +366,8 @@ fn sample_grid(view: &TriangleView<'_>, grid: &SphericalGrid<'_, impl Lobe>, u: 
     Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative, pdf })
 }
 
-/// Draws a point by a uniform direction. Where neighbors of the lattice are seen in very different directions, the direction is
-/// kept as it was drawn: the density does not depend on how it was rounded.
+/// Draws a point by a uniform direction. Where neighbors of the lattice are seen in very different directions, the
+/// direction is kept as it was drawn: the density does not depend on how it was rounded.
 #[inline(never)]
 fn sample_uniformly(
     view: &TriangleView<'_>,

@@ -51,8 +51,8 @@ impl LightsView<'_> {
         }
     }
 
-    /// Checks that leaves and lights refer to each other, so that the density of a sample is looked up under the id that
-    /// the sample came with.
+    /// Checks that leaves and lights refer to each other, so that the density of a sample is looked up under the id
+    /// that the sample came with.
     fn validate_leaves(&self) -> Result<(), Error> {
         let lamp_start = self.meshes.last().copied().unwrap_or(0);
         // The number of a light among all that were added, if it is valid.

@@ -15,8 +15,8 @@ pub(super) struct VisiblePart {
 impl VisiblePart {
     /// Clips a triangle with these vertices, relative to the shading point, by the plane of a normal, if there is one.
     ///
-    /// `determinant` is that of the vertices; see [`SphericalTriangle::new`]. `None` where nothing of the triangle is above
-    /// the horizon, or its solid angle is too small for a double.
+    /// `determinant` is that of the vertices; see [`SphericalTriangle::new`]. `None` where nothing of the triangle is
+    /// above the horizon, or its solid angle is too small for a double.
     #[inline(always)]
     pub(super) fn new(vertices: [DVec3; 3], determinant: f64, horizon: Option<DVec3>) -> Option<Self> {
         let [a, b, c] = vertices;

@@ -1,15 +1,15 @@
 //! A surface with a glossy lobe: a microfacet reflection over a diffuse base.
 //!
-//! The weight of a direction ω is π times what the surface scatters of it, `π f cos θ`, so that a white diffuse surface has
-//! the cosine:
+//! The weight of a direction ω is π times what the surface scatters of it, `π f cos θ`, so that a white diffuse surface
+//! has the cosine:
 //!
 //! ```text
 //! kd cos θ + ks π D(h) G(ω, o) / (4 cos θo)      h = (ω + o) / |ω + o|
 //! ```
 //!
-//! with the GGX distribution D of the roughness α and Smith's height-correlated G (Walter et al. 2007; Heitz 2014). Over a
-//! region of directions with the variance s², the half vector moves by half of it in the plane of incidence, and by
-//! `1 / (2 o·h)` of it across. The mean of D is therefore that of a wider distribution, with
+//! with the GGX distribution D of the roughness α and Smith's height-correlated G (Walter et al. 2007; Heitz 2014).
+//! Over a region of directions with the variance s², the half vector moves by half of it in the plane of incidence, and
+//! by `1 / (2 o·h)` of it across. The mean of D is therefore that of a wider distribution, with
 //!
 //! ```text
 //! α'² = √((α² + s²/4) (α² + s²/(4 (o·h)²)))
@@ -38,8 +38,8 @@ pub(super) const LEAST_OUTGOING: f32 = 1e-3;
 
 /// Share of the largest cosine, 1, that the lobe keeps as a weight wherever it is not below the horizon.
 ///
-/// Chosen with [`EVEN_SHARE`], which vanishes where the mean cosine does. Larger: more samples at the horizon. Smaller: what
-/// little of a cluster stands over the horizon of a lobe starves.
+/// Chosen with [`EVEN_SHARE`], which vanishes where the mean cosine does. Larger: more samples at the horizon. Smaller:
+/// what little of a cluster stands over the horizon of a lobe starves.
 pub(super) const LEAST_WEIGHT: f32 = 1e-3;
 
 /// Least squared length of the sum of two unit vectors. *Proved*: rounding leaves as much of opposite ones.
@@ -47,15 +47,15 @@ pub(super) const LEAST_SUM2: f32 = 1e-7;
 
 /// Points along an edge of a triangle whose irradiance is found by its parts.
 ///
-/// Chosen. Larger: closer for narrow lobes next to large triangles, for a time in proportion to the square. Smaller: the
-/// opposite.
+/// Chosen. Larger: closer for narrow lobes next to large triangles, for a time in proportion to the square. Smaller:
+/// the opposite.
 pub(super) const PARTS: usize = 4;
 
 /// A surface with a glossy reflection over a diffuse base, seen from an outgoing direction.
 ///
-/// A sample is drawn in proportion to what the surface reflects of it, as far as the GGX lobe says. The lobe *guides*: the
-/// densities are exact for any of its parameters, and the host evaluates its own BSDF, whatever it is. So Fresnel and colors
-/// may be left out or put into the weights, and a lobe that is about right serves.
+/// A sample is drawn in proportion to what the surface reflects of it, as far as the GGX lobe says. The lobe *guides*:
+/// the densities are exact for any of its parameters, and the host evaluates its own BSDF, whatever it is. So Fresnel
+/// and colors may be left out or put into the weights, and a lobe that is about right serves.
 ///
 /// ```
 /// use fanlight::{Glossy, ShadingPoint, glam::Vec3};
@@ -82,14 +82,14 @@ impl Glossy {
     ///
     /// - `normal` is a unit vector to the side that light is gathered from, treated as that of
     ///   [`ShadingPoint::new`](crate::ShadingPoint::new).
-    /// - `outgoing` points away from the surface, to where the light is scattered: to the viewer, back along a path. Its length
-    ///   does not matter.
-    /// - `roughness` is the α of the GGX distribution, in `[0, 1]`: the root mean square slope over √2, and *not* its square
-    ///   root, which artists are often given. Below 1e-3 it counts as 1e-3, and above 1 as 1. There, light that is not found
-    ///   by sampling the BSDF is hardly found by sampling lights.
+    /// - `outgoing` points away from the surface, to where the light is scattered: to the viewer, back along a path.
+    ///   Its length does not matter.
+    /// - `roughness` is the α of the GGX distribution, in `[0, 1]`: the root mean square slope over √2, and *not* its
+    ///   square root, which artists are often given. Below 1e-3 it counts as 1e-3, and above 1 as 1. There, light that
+    ///   is not found by sampling the BSDF is hardly found by sampling lights.
     ///
-    /// If the outgoing direction is below the surface or has no direction, or the roughness is NaN, nothing is reflected: the
-    /// point is guided like a diffuse one.
+    /// If the outgoing direction is below the surface or has no direction, or the roughness is NaN, nothing is
+    /// reflected: the point is guided like a diffuse one.
     #[must_use]
     pub fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
         let (outgoing, is_valid) = (unit_or_zero(outgoing), !roughness.is_nan());
@@ -101,8 +101,8 @@ impl Glossy {
     /// Returns the same surface with these albedos of the diffuse base and of the lobe: the shares of light that each
     /// scatters, such as luminances, with Fresnel or without.
     ///
-    /// Only their ratio matters. What is negative or NaN counts as zero, and an infinite one as a large number. If both are
-    /// zero, the point is guided like a diffuse one.
+    /// Only their ratio matters. What is negative or NaN counts as zero, and an infinite one as a large number. If both
+    /// are zero, the point is guided like a diffuse one.
     #[must_use]
     pub fn with_weights(self, diffuse: f32, glossy: f32) -> Self {
         let [diffuse, glossy] = [diffuse, glossy].map(|weight| f64::from(at_most(at_least(weight, 0.0), f32::MAX)));
@@ -203,8 +203,8 @@ impl GgxLobe {
         self.share * distribution * (visibility * cosine)
     }
 
-    /// Returns the squared sine of the angle between the half vector and the normal, and the squared length of the sum of
-    /// both directions.
+    /// Returns the squared sine of the angle between the half vector and the normal, and the squared length of the sum
+    /// of both directions.
     #[inline(always)]
     fn half_vector(&self, [x, y, z]: [f32; 3]) -> (f32, f32) {
         let ([nx, ny, nz], [ox, oy, oz]) = (self.normal, self.outgoing);
@@ -226,8 +226,8 @@ impl Lobe for GgxLobe {
         self.diffuse * toward + distance * (value + LEAST_WEIGHT * self.share)
     }
 
-    /// The logarithm of D changes by 4 h / (α² + h²) for each step of the half vector, which is 2 / √(α² + h²) where that is
-    /// largest.
+    /// The logarithm of D changes by 4 h / (α² + h²) for each step of the half vector, which is 2 / √(α² + h²) where
+    /// that is largest.
     #[inline(always)]
     fn variation(&self, direction: [f32; 3], spread2: f32) -> f32 {
         let (sine2, sum2) = self.half_vector(direction);

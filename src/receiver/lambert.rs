@@ -44,9 +44,9 @@ fn clipped(vertices: &[Vec3; 3], heights: [f32; 3]) -> Vec3 {
 
 /// Returns the normal of an edge's plane, times the edge's angle over 2π.
 ///
-/// The cross product has the sine as its length. The quotient of an angle and its sine is a smooth function of the cosine,
-/// here as a rational one within 1.5e-6 (Hill and Heitz 2016, "Real-time area lighting: a journey from research to
-/// production"); unlike an arccosine, it is as good for short edges.
+/// The cross product has the sine as its length. The quotient of an angle and its sine is a smooth function of the
+/// cosine, here as a rational one within 1.5e-6 (Hill and Heitz 2016, "Real-time area lighting: a journey from research
+/// to production"); unlike an arccosine, it is as good for short edges.
 #[inline(always)]
 fn edge(v: Vec3, next: Vec3) -> Vec3 {
     let cosine = v.dot(next);

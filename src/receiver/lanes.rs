@@ -1,5 +1,5 @@
-//! A shading point as the loop over the lanes of a node needs it: numbers alone, so that all kinds share one loop without a
-//! branch.
+//! A shading point as the loop over the lanes of a node needs it: numbers alone, so that all kinds share one loop
+//! without a branch.
 
 use glam::Vec3;
 
@@ -7,11 +7,11 @@ use super::lobe::{Lobe, NoLobe};
 use crate::geometry::HORIZON_ROUNDING;
 use crate::math::at_least;
 
-/// Least expected cosine of a cluster that is not culled, at the receiver and at the lights. It keeps every light possible
-/// that may be visible.
+/// Least expected cosine of a cluster that is not culled, at the receiver and at the lights. It keeps every light
+/// possible that may be visible.
 ///
-/// *Measured* on cloud-10000 (docs/ACCURACY.md, "Moments"). A larger value wastes samples on clusters seen edge-on; a smaller
-/// one makes their samples rarer and brighter.
+/// *Measured* on cloud-10000 (docs/ACCURACY.md, "Moments"). A larger value wastes samples on clusters seen edge-on; a
+/// smaller one makes their samples rarer and brighter.
 pub(crate) const LEAST_CLUSTER_COSINE: f32 = 1e-3;
 
 /// A shading point prepared for the vector loop over the lanes of a node, which is compiled for each kind of lobe.
@@ -56,8 +56,8 @@ impl ReceiverLanes {
 }
 
 impl<L: Lobe> ReceiverLanes<L> {
-    /// Returns the mean weight of a small cell of directions by the cosine of its central direction to the normal. `least`
-    /// is that of [`ReceiverKind::least_over_directions`](super::ReceiverKind::least_over_directions).
+    /// Returns the mean weight of a small cell of directions by the cosine of its central direction to the normal.
+    /// `least` is that of [`ReceiverKind::least_over_directions`](super::ReceiverKind::least_over_directions).
     #[inline(always)]
     pub(crate) fn weight_of_cell(&self, cosine: f32, least: f32) -> f32 {
         at_least(f32::from_bits(cosine.to_bits() & self.cosine_bits), least)

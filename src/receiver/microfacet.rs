@@ -1,21 +1,21 @@
 //! A surface with microfacet lobes of any kind: reflection of one roughness along a tangent and of another across, and
 //! transmission to the other side.
 //!
-//! The weight of a direction ω is π times what the surface scatters of it. In the terms of Walter et al. 2007, with η the index
-//! of refraction on the side of ω relative to that of the outgoing direction o (1 for a reflection), the half vector is
-//! `h = ± (o + η ω) / |o + η ω|`, and
+//! The weight of a direction ω is π times what the surface scatters of it. In the terms of Walter et al. 2007, with η
+//! the index of refraction on the side of ω relative to that of the outgoing direction o (1 for a reflection), the half
+//! vector is `h = ± (o + η ω) / |o + η ω|`, and
 //!
 //! ```text
 //! π f cos θ = π D(h) G(ω, o) / (4 cos θo) · 4 η² |o·h| |ω·h| / |o + η ω|²
 //! ```
 //!
-//! The last factor, the quotient of the two Jacobians, is 1 for a reflection. D is the anisotropic GGX distribution, and G
-//! Smith's height-correlated term (Heitz 2014). Without a change of index light passes straight on; the lobe is then the
-//! reflection, mirrored to the other side.
+//! The last factor, the quotient of the two Jacobians, is 1 for a reflection. D is the anisotropic GGX distribution,
+//! and G Smith's height-correlated term (Heitz 2014). Without a change of index light passes straight on; the lobe is
+//! then the reflection, mirrored to the other side.
 //!
-//! Over a region of directions with the variance s², the half vector moves by `η |ω·h| / |o + η ω|` of it in the plane of
-//! incidence, and by `η / |o + η ω|` across. Both widen the distribution: to the matrix of the roughnesses, `diag(αx², αy²)`,
-//! that of this movement is added.
+//! Over a region of directions with the variance s², the half vector moves by `η |ω·h| / |o + η ω|` of it in the plane
+//! of incidence, and by `η / |o + η ω|` across. Both widen the distribution: to the matrix of the roughnesses,
+//! `diag(αx², αy²)`, that of this movement is added.
 
 mod lobe;
 
@@ -42,8 +42,8 @@ const THIN: f32 = 0.01;
 /// Range of the relative index of refraction. Chosen: all materials are within, seen from either side.
 const INDICES: [f32; 2] = [0.1, 10.0];
 
-/// Least squared length of what a direction has across a half vector. *Proved*: rounding leaves as much. Larger: half vectors
-/// near the directions are blurred as if these were on it.
+/// Least squared length of what a direction has across a half vector. *Proved*: rounding leaves as much. Larger: half
+/// vectors near the directions are blurred as if these were on it.
 const LEAST_ACROSS2: f32 = 1e-12;
 
 /// Sum of all weights of a surface. *Format.*
@@ -51,8 +51,8 @@ const ALL_SHARES: u16 = u16::MAX;
 
 /// A surface with a glossy reflection and a rough transmission over a diffuse base, seen from an outgoing direction.
 ///
-/// As with [`Glossy`], the lobes *guide*: densities are exact whatever the host's own BSDF is. A reflection of one roughness in
-/// all directions and without a transmission is faster as a [`Glossy`].
+/// As with [`Glossy`], the lobes *guide*: densities are exact whatever the host's own BSDF is. A reflection of one
+/// roughness in all directions and without a transmission is faster as a [`Glossy`].
 ///
 /// ```
 /// use fanlight::{Glossy, Microfacet, ShadingPoint, glam::Vec3};
@@ -91,9 +91,9 @@ const _: () = assert!(size_of::<Microfacet>() <= 44);
 impl Microfacet {
     /// Returns a surface that has nothing but a reflection, of one roughness in all directions.
     ///
-    /// All parameters are those of [`Glossy::new`]. The outgoing direction must be on the side of the normal. If it is not, has
-    /// no direction, or a roughness is NaN, the point is guided like a diffuse one, and with a transmission like a transmissive
-    /// one.
+    /// All parameters are those of [`Glossy::new`]. The outgoing direction must be on the side of the normal. If it is
+    /// not, has no direction, or a roughness is NaN, the point is guided like a diffuse one, and with a transmission
+    /// like a transmissive one.
     #[must_use]
     pub fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
         let (normal, outgoing) = (unit(normal), unit_or_zero(outgoing));
@@ -104,10 +104,11 @@ impl Microfacet {
     /// Returns the same surface with a roughness along a tangent and one across.
     ///
     /// - `tangent` is any vector; what it has along the normal does not count, and its length does not matter.
-    /// - `roughness` are the αx and αy of the GGX distribution, each as in [`Glossy::new`]: the root mean square slopes along the
-    ///   tangent and across it, over √2.
+    /// - `roughness` are the αx and αy of the GGX distribution, each as in [`Glossy::new`]: the root mean square slopes
+    ///   along the tangent and across it, over √2.
     ///
-    /// If the tangent has no direction across the normal, the surface is as rough in all directions, by the geometric mean.
+    /// If the tangent has no direction across the normal, the surface is as rough in all directions, by the geometric
+    /// mean.
     #[must_use]
     pub fn anisotropic(self, tangent: Vec3, roughness: [f32; 2]) -> Self {
         let surface = self.with_roughness(roughness);
@@ -128,12 +129,12 @@ impl Microfacet {
         Self { roughness: roughness.map(|alpha| alpha.clamp(LEAST_ROUGHNESS, 1.0)), ..self }
     }
 
-    /// Returns the same surface with these albedos of the diffuse base, of the reflection, and of the transmission: the shares
-    /// of light that each scatters, such as luminances, with Fresnel or without.
+    /// Returns the same surface with these albedos of the diffuse base, of the reflection, and of the transmission: the
+    /// shares of light that each scatters, such as luminances, with Fresnel or without.
     ///
-    /// Only their ratios matter. What is negative or NaN counts as zero, and an infinite one as a large number. If the last two
-    /// are zero, the point is guided like a diffuse one. The factor η² by which a refraction changes radiance may be in the weight
-    /// of the transmission.
+    /// Only their ratios matter. What is negative or NaN counts as zero, and an infinite one as a large number. If the
+    /// last two are zero, the point is guided like a diffuse one. The factor η² by which a refraction changes radiance
+    /// may be in the weight of the transmission.
     #[must_use]
     pub fn with_weights(self, diffuse: f32, reflected: f32, transmitted: f32) -> Self {
         let weights =
@@ -158,11 +159,12 @@ impl Microfacet {
         Self { shares, ..self }
     }
 
-    /// Returns the same surface with an index of refraction: that of the far side, relative to the side of the normal. A glass
-    /// of 1.5 has 1.5 as seen from the air, and 1 / 1.5 as seen from inside.
+    /// Returns the same surface with an index of refraction: that of the far side, relative to the side of the normal.
+    /// A glass of 1.5 has 1.5 as seen from the air, and 1 / 1.5 as seen from inside.
     ///
-    /// Within 0.01 of 1, as without this call, light passes straight on, and what is transmitted is spread as the reflection is:
-    /// a thin wall, such as a pane with air on both sides. NaN counts as 1, and what is below 0.1 or above 10 as these.
+    /// Within 0.01 of 1, as without this call, light passes straight on, and what is transmitted is spread as the
+    /// reflection is: a thin wall, such as a pane with air on both sides. NaN counts as 1, and what is below 0.1 or
+    /// above 10 as these.
     #[must_use]
     pub fn with_ior(self, ior: f32) -> Self {
         // NaN fails.
@@ -220,8 +222,8 @@ impl Microfacet {
         self.ior
     }
 
-    /// Returns the weights of the diffuse base, of the reflection and of the transmission, which add up to 1, in steps of
-    /// 1 / 65535.
+    /// Returns the weights of the diffuse base, of the reflection and of the transmission, which add up to 1, in steps
+    /// of 1 / 65535.
     #[must_use]
     pub fn weights(&self) -> [f32; 3] {
         let [reflected, transmitted] = self.shares;

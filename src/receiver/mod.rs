@@ -1,9 +1,9 @@
 //! The point that light is gathered at, and how a direction is weighted there.
 //!
-//! Each kind of receiver is a file, which answers the same questions ([`ReceiverKind`]): the weight of a direction, whether
-//! a triangle is dark for certain, the mean over a cone of directions, the weights of the cells of a triangle, the exact
-//! irradiance, and what the loop over the lanes of a tree's node needs. A new kind is a new file, a variant of
-//! [`Receiver`] and a line in `dispatch`. If it has a [`Lobe`], that is a line in `for_lobe` as well.
+//! Each kind of receiver is a file, which answers the same questions ([`ReceiverKind`]): the weight of a direction,
+//! whether a triangle is dark for certain, the mean over a cone of directions, the weights of the cells of a triangle,
+//! the exact irradiance, and what the loop over the lanes of a tree's node needs. A new kind is a new file, a variant
+//! of [`Receiver`] and a line in `dispatch`. If it has a [`Lobe`], that is a line in `for_lobe` as well.
 
 mod effort;
 mod glossy;
@@ -70,8 +70,8 @@ pub(crate) const ALL_GROUPS: u32 = u32::MAX;
 
 /// Largest difference of a squared length from 1 up to which a normal counts as a unit vector.
 ///
-/// Twice 1e-3 to first order, which is what a normal interpolated in half precision is off. A larger value accepts normals
-/// that bias nothing but guide worse; a smaller one spends time on normals that are good enough. Documented at
+/// Twice 1e-3 to first order, which is what a normal interpolated in half precision is off. A larger value accepts
+/// normals that bias nothing but guide worse; a smaller one spends time on normals that are good enough. Documented at
 /// [`ShadingPoint::new`].
 const UNIT_TOLERANCE: f32 = 2e-3;
 
@@ -99,8 +99,9 @@ impl Receiver {
 impl ShadingPoint {
     /// Returns a point with any receiver.
     ///
-    /// A normal whose length is within 1e-3 of 1 is taken as it is, bit for bit. Any other normal is normalized; one without
-    /// a direction (zero, infinite or NaN) stays as it is, and the samples at such a point are valid but useless.
+    /// A normal whose length is within 1e-3 of 1 is taken as it is, bit for bit. Any other normal is normalized; one
+    /// without a direction (zero, infinite or NaN) stays as it is, and the samples at such a point are valid but
+    /// useless.
     #[must_use]
     pub fn new(position: Vec3, receiver: Receiver) -> Self {
         let receiver = match receiver {
@@ -118,23 +119,24 @@ impl ShadingPoint {
 
     /// Sets the light groups that the point receives, a set of bits. All by default.
     ///
-    /// A light arrives if it shares a group with the point: if `mesh.groups & x.groups` is not zero. All other lights have the
-    /// density zero here.
+    /// A light arrives if it shares a group with the point: if `mesh.groups & x.groups` is not zero. All other lights
+    /// have the density zero here.
     #[must_use]
     pub const fn with_groups(mut self, groups: u32) -> Self {
         self.groups = groups;
         self
     }
 
-    /// Sets how much a call may do to follow the light: [`Effort::Full`] by default. Samples and densities are exact with either.
+    /// Sets how much a call may do to follow the light: [`Effort::Full`] by default. Samples and densities are exact
+    /// with either.
     #[must_use]
     pub const fn with_effort(mut self, effort: Effort) -> Self {
         self.effort = effort;
         self
     }
 
-    /// Sets the time at which light is gathered, in the shutter interval from 0 to 1; 0 until this sets it, and for NaN. A time
-    /// outside of the interval counts as its nearer end.
+    /// Sets the time at which light is gathered, in the shutter interval from 0 to 1; 0 until this sets it, and for
+    /// NaN. A time outside of the interval counts as its nearer end.
     ///
     /// It matters only where lights move: [`Mesh::moving_to`](crate::Mesh::moving_to) and
     /// [`Instance::moving_to`](crate::Instance::moving_to).
@@ -163,8 +165,8 @@ impl ShadingPoint {
         }
     }
 
-    /// Returns a point on a surface that gathers light from both sides. `normal` is a unit vector; see [`Self::new`] for
-    /// other lengths.
+    /// Returns a point on a surface that gathers light from both sides. `normal` is a unit vector; see [`Self::new`]
+    /// for other lengths.
     #[must_use]
     pub fn transmissive(position: Vec3, normal: Vec3) -> Self {
         Self {
@@ -215,8 +217,8 @@ impl ShadingPoint {
     }
 
     /// Returns the weight that samples follow in a unit direction that points away from this point: the
-    /// [`cosine`](Self::cosine) without a lobe, and with one what the lobe scatters, lobe and cosine together, relative to a
-    /// white diffuse surface or to an isotropic medium.
+    /// [`cosine`](Self::cosine) without a lobe, and with one what the lobe scatters, lobe and cosine together, relative
+    /// to a white diffuse surface or to an isotropic medium.
     ///
     /// A target for resampling or a check of parameters; no estimate needs it.
     #[must_use]
@@ -224,7 +226,8 @@ impl ShadingPoint {
         self.receiver.weight(direction)
     }
 
-    /// Returns the point prepared for the loop over the lanes of a node. The lobe is that of the receiver, by [`for_lobe`].
+    /// Returns the point prepared for the loop over the lanes of a node. The lobe is that of the receiver, by
+    /// [`for_lobe`].
     #[inline(always)]
     pub(crate) fn lanes<L: Lobe>(&self, lobe: L) -> ReceiverLanes<L> {
         self.receiver.lanes(self.position).with_lobe(lobe)
@@ -242,8 +245,8 @@ fn unit(normal: Vec3) -> Vec3 {
     if (normal.length_squared() - 1.0).abs() <= UNIT_TOLERANCE { normal } else { normal.normalize_or(normal) }
 }
 
-/// How heights over the receiver's plane and distances make the weight of a cell: numbers alone, so that all kinds share
-/// one loop without a branch.
+/// How heights over the receiver's plane and distances make the weight of a cell: numbers alone, so that all kinds
+/// share one loop without a branch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HeightWeights {
     /// What a height below the plane is multiplied by.
@@ -304,8 +307,8 @@ pub(crate) trait ReceiverKind: Copy {
     /// Returns the weight of the direction to a center at this mean height and distance, apart from a lobe.
     fn weight_at_height(self, height: f32, inverse_distance: f32) -> f32;
 
-    /// Returns the irradiance over π from a triangle of unit radiance, exact as far as `f32` goes, but for a lobe. The vertices
-    /// are relative to the receiver.
+    /// Returns the irradiance over π from a triangle of unit radiance, exact as far as `f32` goes, but for a lobe. The
+    /// vertices are relative to the receiver.
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32;
 
     /// Returns the least mean weight of a small cell of directions, of which the central one is weighed

@@ -7,10 +7,10 @@
 //! det M (a·r) (n·Mr) / |Mr|⁴
 //! ```
 //!
-//! Heights over the receiver's plane are those over the plane with the normal Mᵀn in the object's space, and both sides of a
-//! triangle stay its sides. So the loop over lanes finds `(a·r) (Mᵀn·r) / |r|⁴` by itself, and what is missing is the factor
-//! `det M (|r| / |Mr|)⁴`. It is constant for a rotation and a uniform scale. For any other map it takes the place of a lobe,
-//! and so does what a lobe in the world makes of the direction Mr.
+//! Heights over the receiver's plane are those over the plane with the normal Mᵀn in the object's space, and both sides
+//! of a triangle stay its sides. So the loop over lanes finds `(a·r) (Mᵀn·r) / |r|⁴` by itself, and what is missing is
+//! the factor `det M (|r| / |Mr|)⁴`. It is constant for a rotation and a uniform scale. For any other map it takes the
+//! place of a lobe, and so does what a lobe in the world makes of the direction Mr.
 
 use glam::{DMat3, DVec3};
 
@@ -70,7 +70,8 @@ pub(crate) struct PlacedLobe<L = NoLobe> {
 }
 
 impl<L: Lobe> PlacedLobe<L> {
-    /// Returns the lobe for a map, with the lobe of the receiver in the world. `normal_length` is that of [`own_receiver`].
+    /// Returns the lobe for a map, with the lobe of the receiver in the world. `normal_length` is that of
+    /// [`own_receiver`].
     pub(crate) fn new(placement: &Placement, receiver: Receiver, normal_length: f64, margin: f32, lobe: L) -> Self {
         let is_medium = receiver.normal() == glam::Vec3::ZERO;
         Self {
@@ -129,8 +130,8 @@ impl<L: Lobe> Lobe for PlacedLobe<L> {
     }
 }
 
-/// Returns the receiver in an object's space, apart from a lobe, and the length of its normal there before it was made a unit
-/// vector. `linear` is that of the map to the world.
+/// Returns the receiver in an object's space, apart from a lobe, and the length of its normal there before it was made
+/// a unit vector. `linear` is that of the map to the world.
 pub(crate) fn own_receiver(receiver: Receiver, linear: &DMat3) -> (Receiver, f64) {
     let normal: DVec3 = linear.transpose() * receiver.normal().as_dvec3();
     let unit = normal.normalize_or_zero().as_vec3();

@@ -6,8 +6,8 @@
 //! (1 - g²) / (1 + g² + 2 g ω·o)^(3/2)
 //! ```
 //!
-//! The Legendre coefficients of this function are the powers of g. Blurred by directions whose mean cosine to their center is
-//! c, it is therefore the same function of about `c g`.
+//! The Legendre coefficients of this function are the powers of g. Blurred by directions whose mean cosine to their
+//! center is c, it is therefore the same function of about `c g`.
 
 use core::f32::consts::FRAC_1_PI;
 
@@ -46,9 +46,10 @@ pub struct Scattering {
 impl Scattering {
     /// Returns a medium.
     ///
-    /// - `outgoing` points to where the light is scattered: to the viewer, back along a path. Its length does not matter.
-    /// - `asymmetry` is the mean cosine g of the angle by which light is deflected, in `(-1, 1)`: positive scatters forward.
-    ///   Absolute values above 0.99 count as 0.99.
+    /// - `outgoing` points to where the light is scattered: to the viewer, back along a path. Its length does not
+    ///   matter.
+    /// - `asymmetry` is the mean cosine g of the angle by which light is deflected, in `(-1, 1)`: positive scatters
+    ///   forward. Absolute values above 0.99 count as 0.99.
     ///
     /// If the outgoing direction has no direction, or the asymmetry is NaN, the point is guided like an isotropic one.
     #[must_use]

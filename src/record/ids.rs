@@ -27,19 +27,19 @@ ids! {
     /// A mesh that was added to a builder. Meshes are numbered from 0 in the order in which they are added.
     MeshId of the "mesh";
 
-    /// A texture, or a function that takes the place of one, that was added to a builder. Both are numbered together from 0 in
-    /// the order in which they are added.
+    /// A texture, or a function that takes the place of one, that was added to a builder. Both are numbered together
+    /// from 0 in the order in which they are added.
     TextureId of the "texture";
 
-    /// A light that was added to a builder and is not made of triangles ([`Lamp`](crate::Lamp)). These lights are numbered from
-    /// 0 in the order in which they are added.
+    /// A light that was added to a builder and is not made of triangles ([`Lamp`](crate::Lamp)). These lights are
+    /// numbered from 0 in the order in which they are added.
     LightId of the "light";
 
     /// A profile that was added to a builder. Profiles are numbered from 0 in the order in which they are added.
     ProfileId of the "profile";
 
-    /// An object that was added to a builder: meshes that are placed by instances. Objects are numbered from 0 in the order in
-    /// which they are added.
+    /// An object that was added to a builder: meshes that are placed by instances. Objects are numbered from 0 in the
+    /// order in which they are added.
     ObjectId of the "object";
 
     /// An object at one place. Instances are numbered from 0 in the order in which they are added, those of all objects
@@ -50,8 +50,8 @@ ids! {
 /// One triangle of one mesh.
 ///
 /// A triangle of an [`Instance`](crate::Instance) is numbered within its object: the mesh is one of those that
-/// [`add_object`](crate::LightSamplerBuilder::add_object) was given, numbered from 0. Which instance it belongs to is said
-/// beside it ([`Hit::instance`](crate::Hit::instance)).
+/// [`add_object`](crate::LightSamplerBuilder::add_object) was given, numbered from 0. Which instance it belongs to is
+/// said beside it ([`Hit::instance`](crate::Hit::instance)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub struct TriangleId {

@@ -42,11 +42,11 @@ pub enum SampledLight {
     /// A direction of the environment
     /// ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)).
     Environment,
-    /// A point of a light that has an extent and is not made of triangles: a sphere, for example. Of a distant light with an
-    /// angular radius, a direction.
+    /// A point of a light that has an extent and is not made of triangles: a sphere, for example. Of a distant light
+    /// with an angular radius, a direction.
     Shape(LightId),
-    /// A light without an extent: a point light, a spot, a light with a profile, or a distant light without an angular radius.
-    /// No ray finds it by chance, so multiple importance sampling does not apply.
+    /// A light without an extent: a point light, a spot, a light with a profile, or a distant light without an angular
+    /// radius. No ray finds it by chance, so multiple importance sampling does not apply.
     Punctual(LightId),
 }
 
@@ -86,12 +86,12 @@ impl SampledLight {
 pub struct LightSample {
     /// What was drawn: a point of a triangle or of another light, or a direction of the environment.
     pub light: SampledLight,
-    /// World position of the point. For the environment and distant lights, a position 10¹⁵ units away along the direction:
-    /// behind everything that a scene can hold.
+    /// World position of the point. For the environment and distant lights, a position 10¹⁵ units away along the
+    /// direction: behind everything that a scene can hold.
     pub position: Vec3,
-    /// Unit normal of the front side: of a triangle, the side around which its vertices run counter-clockwise; of a sphere or
-    /// a tube, the outside. For the environment, for distant lights, and for lights without an extent, the opposite of
-    /// the direction.
+    /// Unit normal of the front side: of a triangle, the side around which its vertices run counter-clockwise; of a
+    /// sphere or a tube, the outside. For the environment, for distant lights, and for lights without an extent, the
+    /// opposite of the direction.
     pub normal: Vec3,
     /// Unit direction from the shading point to the point.
     pub direction: Vec3,
@@ -103,11 +103,12 @@ pub struct LightSample {
     /// It counts this light alone. Where a ray can cross several portals, a host that evaluates all that
     /// arrives along the direction divides by the density of the *direction* instead.
     ///
-    /// For a light without an extent ([`Self::has_extent`]), this is no density but the probability of the light, `pmf`.
-    /// Divide intensity over squared distance by it, or the irradiance of a distant light, and give the sample the weight 1.
+    /// For a light without an extent ([`Self::has_extent`]), this is no density but the probability of the light,
+    /// `pmf`. Divide intensity over squared distance by it, or the irradiance of a distant light, and give the sample
+    /// the weight 1.
     pub pdf: f32,
-    /// Density of the same point per area of the light. Finite and above zero. For the environment, per area of the unit
-    /// sphere, which is `pdf`. For a light without an extent, `pdf` too.
+    /// Density of the same point per area of the light. Finite and above zero. For the environment, per area of the
+    /// unit sphere, which is `pdf`. For a light without an extent, `pdf` too.
     pub pdf_area: f32,
     /// Probability (`pmf`) of having chosen the triangle or other light, or the environment. In `(0, 1]`.
     pub pmf: f32,
@@ -121,8 +122,8 @@ impl LightSample {
         self.light.hit()
     }
 
-    /// Whether the light has an extent. Of a light without one, `pdf` is a probability, and multiple importance sampling
-    /// does not apply.
+    /// Whether the light has an extent. Of a light without one, `pdf` is a probability, and multiple importance
+    /// sampling does not apply.
     #[inline]
     #[must_use]
     pub const fn has_extent(&self) -> bool {

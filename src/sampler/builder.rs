@@ -20,8 +20,8 @@ const PLACED: f64 = 0.9;
 
 /// Collects the lights of a scene and builds a [`LightSampler`].
 ///
-/// Everything is checked when it is added; what was accepted can always be sampled. The methods come in two forms: those
-/// that take and return the builder are for one expression, those that begin with `add_` are for loops.
+/// Everything is checked when it is added; what was accepted can always be sampled. The methods come in two forms:
+/// those that take and return the builder are for one expression, those that begin with `add_` are for loops.
 ///
 /// ```
 /// use fanlight::glam::Vec3;
@@ -92,13 +92,14 @@ impl<'a> LightSamplerBuilder<'a> {
         self
     }
 
-    /// Makes the environment one more light, next to the triangles: for scenes under the open sky, or with openings that
-    /// nobody has marked as portals. Off by default.
+    /// Makes the environment one more light, next to the triangles: for scenes under the open sky, or with openings
+    /// that nobody has marked as portals. Off by default.
     ///
-    /// A sample then is a point of a triangle or a direction of the environment ([`SampledLight`](crate::SampledLight)), chosen
-    /// by what each is estimated to send to the point. One call thus replaces [`PointSampler::sample`](crate::PointSampler::sample)
-    /// and [`Environment::sample`], and a path vertex needs one shadow ray instead of two. The estimate knows of no walls: where
-    /// all that is seen of the environment is seen through portals, leave this off.
+    /// A sample then is a point of a triangle or a direction of the environment
+    /// ([`SampledLight`](crate::SampledLight)), chosen by what each is estimated to send to the point. One call thus
+    /// replaces [`PointSampler::sample`](crate::PointSampler::sample) and [`Environment::sample`], and a path vertex
+    /// needs one shadow ray instead of two. The estimate knows of no walls: where all that is seen of the environment
+    /// is seen through portals, leave this off.
     ///
     /// Without any triangle, the environment is the only light. A black environment is none.
     pub fn environment_as_light(mut self) -> Self {
@@ -106,8 +107,8 @@ impl<'a> LightSamplerBuilder<'a> {
         self
     }
 
-    /// Sets the light groups that the environment is in, a set of bits, where it is a light; all by default. A portal shows the
-    /// environment to those that see the portal, by the groups of the portal's own mesh.
+    /// Sets the light groups that the environment is in, a set of bits, where it is a light; all by default. A portal
+    /// shows the environment to those that see the portal, by the groups of the portal's own mesh.
     pub fn environment_groups(mut self, groups: u32) -> Self {
         self.collection.environment_groups = groups;
         self
@@ -173,31 +174,32 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// # Errors
     ///
-    /// If a vertex is not finite or has a coordinate above 1e9, an index has no vertex, the weight is NaN, negative
-    /// or above 1e30, or it is a texture of another builder or one without as many uvs as vertices; if the bounds of a
-    /// [`Procedural`] are not finite, negative or in the wrong order, or its weight is not within them; or if a mesh that
-    /// [moves](Mesh::moving_to) has another number of vertices at the end.
+    /// If a vertex is not finite or has a coordinate above 1e9, an index has no vertex, the weight is NaN, negative or
+    /// above 1e30, or it is a texture of another builder or one without as many uvs as vertices; if the bounds of a
+    /// [`Procedural`] are not finite, negative or in the wrong order, or its weight is not within them; or if a mesh
+    /// that [moves](Mesh::moving_to) has another number of vertices at the end.
     pub fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<MeshId, Error> {
         self.collection.add_mesh(mesh)
     }
 
-    /// Adds a profile that [`ProfileLight`](crate::ProfileLight)s can refer to. After an error the builder is as it was before.
+    /// Adds a profile that [`ProfileLight`](crate::ProfileLight)s can refer to. After an error the builder is as it was
+    /// before.
     ///
     /// # Errors
     ///
-    /// If there are fewer than two vertical angles or no horizontal one, angles do not increase or are out of their ranges, or
-    /// an intensity is negative, not finite or above 1e30, or missing.
+    /// If there are fewer than two vertical angles or no horizontal one, angles do not increase or are out of their
+    /// ranges, or an intensity is negative, not finite or above 1e30, or missing.
     pub fn add_profile(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
         self.collection.add_profile(profile)
     }
 
-    /// Adds an image that [`ProfileLight`](crate::ProfileLight)s can project, in the place of a profile: both are numbered
-    /// together. After an error the builder is as it was before.
+    /// Adds an image that [`ProfileLight`](crate::ProfileLight)s can project, in the place of a profile: both are
+    /// numbered together. After an error the builder is as it was before.
     ///
     /// # Errors
     ///
-    /// If the image has no texels, more than 2048 along an edge, or another number of intensities than its size says, an angle of
-    /// view is out of its range, or an intensity is negative, not finite or above 1e30.
+    /// If the image has no texels, more than 2048 along an edge, or another number of intensities than its size says,
+    /// an angle of view is out of its range, or an intensity is negative, not finite or above 1e30.
     pub fn add_projection(&mut self, projection: &Projection<'_>) -> Result<ProfileId, Error> {
         self.collection.add_projection(projection)
     }
@@ -206,15 +208,15 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// # Errors
     ///
-    /// If a number is not finite, the light reaches beyond a coordinate of 1e9, a length is not positive, a radiance, an
-    /// intensity or an irradiance is negative or above 1e30, or there is no such profile.
+    /// If a number is not finite, the light reaches beyond a coordinate of 1e9, a length is not positive, a radiance,
+    /// an intensity or an irradiance is negative or above 1e30, or there is no such profile.
     pub fn add_light(&mut self, light: impl Into<Lamp>) -> Result<LightId, Error> {
         self.collection.add_lamp(light.into(), ALL_GROUPS)
     }
 
-    /// Adds a light that is not made of triangles to some light groups alone, a set of bits, as [`Mesh::groups`] does for a mesh.
-    /// The light stays in them when it is [replaced](LightSampler::refit_lights). After an error the builder is as it was
-    /// before.
+    /// Adds a light that is not made of triangles to some light groups alone, a set of bits, as [`Mesh::groups`] does
+    /// for a mesh. The light stays in them when it is [replaced](LightSampler::refit_lights). After an error the
+    /// builder is as it was before.
     ///
     /// # Errors
     ///
@@ -243,9 +245,10 @@ impl<'a> LightSamplerBuilder<'a> {
         Ok(self)
     }
 
-    /// Adds an object: meshes that send light only where an [`Instance`] places them. It is built once, with a light tree of
-    /// its own, and each instance takes about 150 bytes, however many triangles it has. Within the object its meshes are
-    /// numbered from 0, in the order in which they are given. After an error the builder is as it was before.
+    /// Adds an object: meshes that send light only where an [`Instance`] places them. It is built once, with a light
+    /// tree of its own, and each instance takes about 150 bytes, however many triangles it has. Within the object its
+    /// meshes are numbered from 0, in the order in which they are given. After an error the builder is as it was
+    /// before.
     ///
     /// # Errors
     ///
@@ -281,10 +284,10 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// # Errors
     ///
-    /// If there is no such object; if an element of the transform is not finite, its longest axis is more than 1e6 times as
-    /// long as its shortest, or a length is above 1e12 or below 1e-12, so that it cannot be inverted; if it moves a corner
-    /// of the object's box to a coordinate above 1e9; if any of this holds at some time of an instance that
-    /// [moves](Instance::moving_to); or if the factor of the weights is NaN, negative or above 1e30.
+    /// If there is no such object; if an element of the transform is not finite, its longest axis is more than 1e6
+    /// times as long as its shortest, or a length is above 1e12 or below 1e-12, so that it cannot be inverted; if it
+    /// moves a corner of the object's box to a coordinate above 1e9; if any of this holds at some time of an instance
+    /// that [moves](Instance::moving_to); or if the factor of the weights is NaN, negative or above 1e30.
     pub fn add_instance(&mut self, instance: Instance) -> Result<InstanceId, Error> {
         self.collection.add_instance(&instance)
     }

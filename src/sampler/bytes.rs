@@ -1,8 +1,8 @@
 //! A sampler as bytes, and bytes as a sampler.
 //!
-//! The bytes are sections (see [`buffers`](crate::buffers)), each of plain data under a tag and a version. Loading borrows
-//! them. Every index and value is checked once, so that sampling need not check any; nothing that depends on a tuned
-//! constant is computed again, so bytes of one build load in every build that reads the same versions.
+//! The bytes are sections (see [`buffers`](crate::buffers)), each of plain data under a tag and a version. Loading
+//! borrows them. Every index and value is checked once, so that sampling need not check any; nothing that depends on a
+//! tuned constant is computed again, so bytes of one build load in every build that reads the same versions.
 
 use alloc::vec::Vec;
 
@@ -46,8 +46,8 @@ const REGIONS: ([u8; 4], u32) = (*b"EREG", 1);
 
 impl<'a> LightSamplerView<'a> {
     /// Returns everything as bytes, to be written to disk, mapped, shared or uploaded, and to be read by
-    /// [`Self::from_bytes`] on a machine of the same byte order. Of an [edited](crate::LightSampler::edit) sampler, the bytes hold no
-    /// free places, and give the same samples.
+    /// [`Self::from_bytes`] on a machine of the same byte order. Of an [edited](crate::LightSampler::edit) sampler, the
+    /// bytes hold no free places, and give the same samples.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         if self.scene.lights.is_edited {
@@ -78,12 +78,13 @@ impl<'a> LightSamplerView<'a> {
         write(&sections)
     }
 
-    /// Borrows a sampler from bytes that [`Self::to_bytes`] wrote, without a copy. `bytes` must start at a multiple of four.
+    /// Borrows a sampler from bytes that [`Self::to_bytes`] wrote, without a copy. `bytes` must start at a multiple of
+    /// four.
     ///
     /// # Errors
     ///
-    /// If the bytes are not aligned, are cut off, are of another version or byte order, or hold anything that sampling could
-    /// stumble over. Bytes from an untrusted source are safe to load.
+    /// If the bytes are not aligned, are cut off, are of another version or byte order, or hold anything that sampling
+    /// could stumble over. Bytes from an untrusted source are safe to load.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut sections = Sections::new(bytes)?;
         let parameters: Parameters = sections.take_value(Parameters::TAG, Parameters::VERSION, "parameters")?;

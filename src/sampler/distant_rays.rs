@@ -73,16 +73,16 @@ impl DistantRays {
         })
     }
 
-    /// Returns the density with which [`Self::sample`] draws a ray of a light through the ball: per area perpendicular to it and,
-    /// if the light has an extent, per solid angle.
+    /// Returns the density with which [`Self::sample`] draws a ray of a light through the ball: per area perpendicular
+    /// to it and, if the light has an extent, per solid angle.
     pub(super) fn pdf(&self, light: &DistantRecord) -> f64 {
         let pmf = f64::from(light.irradiance()) / self.irradiance;
         let per_direction = if light.has_extent() { 1.0 / light.cap().solid_angle() } else { 1.0 };
         pmf * per_direction / self.area()
     }
 
-    /// Returns the density of a line through a point in a unit direction towards the lights: the sum over all that have an
-    /// extent and that it leads to, but one.
+    /// Returns the density of a line through a point in a unit direction towards the lights: the sum over all that have
+    /// an extent and that it leads to, but one.
     pub(super) fn line_pdf(
         &self,
         lights: &LightsView<'_>,

@@ -9,15 +9,15 @@ use crate::light::{EditState, Edited, Instance, Lamp, LightChanges, Mesh, MeshUp
 use crate::receiver::ALL_GROUPS;
 use crate::record::{InstanceId, LightId, MeshId, TextureId};
 
-/// Edits of a [`LightSampler`], made by [`LightSampler::edit`]: lights, meshes and instances that are added, removed, moved,
-/// recolored or hidden between two frames.
+/// Edits of a [`LightSampler`], made by [`LightSampler::edit`]: lights, meshes and instances that are added, removed,
+/// moved, recolored or hidden between two frames.
 ///
-/// Edits take what stands still: what moves while the shutter is open ([`Mesh::moving_to`], [`Instance::moving_to`]) stays as it
-/// was built, beside whatever else is edited.
+/// Edits take what stands still: what moves while the shutter is open ([`Mesh::moving_to`], [`Instance::moving_to`])
+/// stays as it was built, beside whatever else is edited.
 ///
-/// Edits are checked one by one, as they are made, and take effect all together in [`Self::apply`]. Each counts for those
-/// after it: what was removed is unknown from then on, and what was added can be changed. Without a call of `apply` nothing
-/// changes.
+/// Edits are checked one by one, as they are made, and take effect all together in [`Self::apply`]. Each counts for
+/// those after it: what was removed is unknown from then on, and what was added can be changed. Without a call of
+/// `apply` nothing changes.
 ///
 /// ```
 /// use fanlight::glam::Vec3;
@@ -43,28 +43,28 @@ use crate::record::{InstanceId, LightId, MeshId, TextureId};
 ///
 /// # Numbers
 ///
-/// The number of what was removed is free, and later batches give it to what they add. So an id of something removed must not
-/// be used after the batch that removed it. Within that batch it is an error.
+/// The number of what was removed is free, and later batches give it to what they add. So an id of something removed
+/// must not be used after the batch that removed it. Within that batch it is an error.
 ///
 /// # Time and memory
 ///
-/// An edit takes a time in proportion to the depth of the light tree, and edits of one part of a tree share most of it. Parts
-/// of the tree that were edited often are built again; over many edits, that adds a share of the time of a build to each. Some
-/// edits take longer:
+/// An edit takes a time in proportion to the depth of the light tree, and edits of one part of a tree share most of it.
+/// Parts of the tree that were edited often are built again; over many edits, that adds a share of the time of a build
+/// to each. Some edits take longer:
 ///
 /// - The first batch of a sampler takes about the time of a [`refit`](LightSampler::refit).
 /// - A textured mesh takes the time to build its trees, as in the builder.
 /// - Edits of [`DistantLight`](crate::DistantLight)s take a time in proportion to the number of all of these.
 /// - A change of a mesh takes a time in proportion to the number of its triangles.
 ///
-/// Places of what was removed are used again, so that memory is bounded by what a sampler has held at a time, however many
-/// edits there are. A
-/// sampler that is edited takes about 15 bytes more for each light, and up to half as much again for free places.
+/// Places of what was removed are used again, so that memory is bounded by what a sampler has held at a time, however
+/// many edits there are. A sampler that is edited takes about 15 bytes more for each light, and up to half as much
+/// again for free places.
 ///
 /// # Exactness
 ///
-/// After every batch all densities are as exact as those of a new build, and so are all proofs of darkness. The tree has another
-/// shape than that of a new build, so samples differ. Equal edits of equal samplers give equal samples.
+/// After every batch all densities are as exact as those of a new build, and so are all proofs of darkness. The tree
+/// has another shape than that of a new build, so samples differ. Equal edits of equal samplers give equal samples.
 ///
 /// A [`Visibility`](crate::Visibility) that was learned before an edit belongs to another tree.
 #[must_use]
@@ -91,8 +91,9 @@ impl fmt::Debug for LightEdits<'_, '_> {
 impl LightSampler {
     /// Begins a batch of edits: see [`LightEdits`].
     ///
-    /// Sampling reads and edits write, so that nobody samples meanwhile. A host that does not want to wait edits or builds a
-    /// sampler of its own beside the one that is sampled, as samplers can be cloned, and sent to another thread and back:
+    /// Sampling reads and edits write, so that nobody samples meanwhile. A host that does not want to wait edits or
+    /// builds a sampler of its own beside the one that is sampled, as samplers can be cloned, and sent to another
+    /// thread and back:
     ///
     /// ```
     /// use std::sync::Arc;
@@ -127,8 +128,8 @@ impl LightSampler {
 }
 
 impl<'a> LightEdits<'_, 'a> {
-    /// Adds a light that is not made of triangles, as [`add_light`](crate::LightSamplerBuilder::add_light) of a builder does.
-    /// After an error the batch is as it was before.
+    /// Adds a light that is not made of triangles, as [`add_light`](crate::LightSamplerBuilder::add_light) of a builder
+    /// does. After an error the batch is as it was before.
     ///
     /// # Errors
     ///
@@ -138,8 +139,8 @@ impl<'a> LightEdits<'_, 'a> {
     }
 
     /// Adds a light that is not made of triangles to some light groups alone, as
-    /// [`add_light_to`](crate::LightSamplerBuilder::add_light_to) of a builder does. After an error the batch is as it was
-    /// before.
+    /// [`add_light_to`](crate::LightSamplerBuilder::add_light_to) of a builder does. After an error the batch is as it
+    /// was before.
     ///
     /// The first light of a sampler that is not in all groups takes a time in proportion to the number of all lights.
     ///
@@ -150,9 +151,9 @@ impl<'a> LightEdits<'_, 'a> {
         self.changes.add_lamp(self.edited.lights, self.state, light.into(), groups)
     }
 
-    /// Replaces a light that is not made of triangles, by one that has moved, has another brightness or is of another kind. The
-    /// light stays in its light groups. One of a radiance or intensity of zero is hidden: it is never sampled, and comes back
-    /// if it is replaced again. After an error the batch is as it was before.
+    /// Replaces a light that is not made of triangles, by one that has moved, has another brightness or is of another
+    /// kind. The light stays in its light groups. One of a radiance or intensity of zero is hidden: it is never
+    /// sampled, and comes back if it is replaced again. After an error the batch is as it was before.
     ///
     /// # Errors
     ///
@@ -170,8 +171,8 @@ impl<'a> LightEdits<'_, 'a> {
         self.changes.remove_lamp(self.state, id)
     }
 
-    /// Adds a texture that meshes of this batch can refer to. Its texels are read until the batch is applied. Textures of a
-    /// batch are numbered from 0; those of a builder or of another batch are not known.
+    /// Adds a texture that meshes of this batch can refer to. Its texels are read until the batch is applied. Textures
+    /// of a batch are numbered from 0; those of a builder or of another batch are not known.
     pub fn add_texture(&mut self, texture: Texture<'a>) -> TextureId {
         self.changes.add_texture(texture)
     }
@@ -181,18 +182,19 @@ impl<'a> LightEdits<'_, 'a> {
         self.changes.add_procedural(function)
     }
 
-    /// Adds a mesh, as [`add_mesh`](crate::LightSamplerBuilder::add_mesh) of a builder does. Its texture is one of this batch.
-    /// After an error the batch is as it was before.
+    /// Adds a mesh, as [`add_mesh`](crate::LightSamplerBuilder::add_mesh) of a builder does. Its texture is one of this
+    /// batch. After an error the batch is as it was before.
     ///
     /// # Errors
     ///
-    /// As those of the builder's method. Errors number the meshes of a batch from 0, in the order in which they are added.
+    /// As those of the builder's method. Errors number the meshes of a batch from 0, in the order in which they are
+    /// added.
     pub fn add_mesh(&mut self, mesh: &Mesh<'_>) -> Result<MeshId, Error> {
         self.changes.add_mesh(self.edited.lights, self.state, mesh)
     }
 
-    /// Moves the vertices of a mesh or multiplies its weights, as [`refit`](LightSampler::refit) does. A factor of 0 hides the
-    /// mesh. After an error the batch is as it was before.
+    /// Moves the vertices of a mesh or multiplies its weights, as [`refit`](LightSampler::refit) does. A factor of 0
+    /// hides the mesh. After an error the batch is as it was before.
     ///
     /// # Errors
     ///
@@ -211,8 +213,8 @@ impl<'a> LightEdits<'_, 'a> {
     }
 
     /// Adds an instance of an object that the sampler was built with, as
-    /// [`add_instance`](crate::LightSamplerBuilder::add_instance) of a builder does. After an error the batch is as it was
-    /// before.
+    /// [`add_instance`](crate::LightSamplerBuilder::add_instance) of a builder does. After an error the batch is as it
+    /// was before.
     ///
     /// # Errors
     ///
@@ -221,8 +223,8 @@ impl<'a> LightEdits<'_, 'a> {
         self.changes.add_instance(self.edited.lights, self.state, &instance)
     }
 
-    /// Replaces an instance: by one at another place, with another factor, in other light groups or of another object. A factor
-    /// of 0 hides it. After an error the batch is as it was before.
+    /// Replaces an instance: by one at another place, with another factor, in other light groups or of another object.
+    /// A factor of 0 hides it. After an error the batch is as it was before.
     ///
     /// # Errors
     ///
@@ -244,8 +246,8 @@ impl<'a> LightEdits<'_, 'a> {
     ///
     /// # Errors
     ///
-    /// If there are more lights (2^27) or nodes of trees over textures than can be numbered, or a mesh that was added is
-    /// multiplied by a factor that takes its texture above 1e30.
+    /// If there are more lights (2^27) or nodes of trees over textures than can be numbered, or a mesh that was added
+    /// is multiplied by a factor that takes its texture above 1e30.
     pub fn apply(self) -> Result<(), Error> {
         let [cost, cost_at_build] = self.costs;
         let applied = self.state.apply(self.changes, self.edited)?;

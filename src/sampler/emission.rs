@@ -32,8 +32,8 @@ pub struct EmissionSample {
     /// Unit direction in which the light travels.
     pub direction: Vec3,
     /// Density of the ray, finite and above zero: per area perpendicular to `direction` and, unless the direction was
-    /// given, per solid angle. For a light without an extent, per solid angle alone: there intensity over density is the
-    /// power. For a distant light without an extent, per area alone: there irradiance over density is the power.
+    /// given, per solid angle. For a light without an extent, per solid angle alone: there intensity over density is
+    /// the power. For a distant light without an extent, per area alone: there irradiance over density is the power.
     ///
     /// It counts this light alone; [`Emission::pdf_ray`] counts all that the ray passes.
     pub pdf: f32,
@@ -61,18 +61,18 @@ impl EmissionSample {
 /// methods.
 ///
 /// What does not depend on the direction it is seen from (emitters, and portals to a constant environment) is drawn by
-/// its power, with cosine-distributed directions from surfaces, and uniform ones from lights without an extent. For portals
-/// to an image, a direction is drawn by radiance times the area that all portals turn towards it, then a point by
-/// transmittance and that area.
+/// its power, with cosine-distributed directions from surfaces, and uniform ones from lights without an extent. For
+/// portals to an image, a direction is drawn by radiance times the area that all portals turn towards it, then a point
+/// by transmittance and that area.
 ///
-/// An environment that is a light itself ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)) sends no
-/// photons here but through portals: where they would start depends on the extent of the host's scene. Neither do distant
-/// lights, until [`within`](Self::within) says where the scene is.
+/// An environment that is a light itself ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light))
+/// sends no photons here but through portals: where they would start depends on the extent of the host's scene. Neither
+/// do distant lights, until [`within`](Self::within) says where the scene is.
 ///
 /// Photons know of no light groups: all lights send them.
 ///
-/// Made by [`LightSampler::emission`](crate::LightSampler::emission) in some microseconds; holds about 1.5 KB. Make it again
-/// after the environment has been rotated.
+/// Made by [`LightSampler::emission`](crate::LightSampler::emission) in some microseconds; holds about 1.5 KB. Make it
+/// again after the environment has been rotated.
 #[derive(Clone, Debug)]
 pub struct Emission<'a> {
     scene: LightScene<'a>,
@@ -106,21 +106,21 @@ impl<'a> Emission<'a> {
         Self { scene, directions, shares: [share(diffuse), share(through)], distant: None }
     }
 
-    /// Sets the time at which light leaves, in the shutter interval from 0 to 1; 0 until this sets it, and for NaN. A time outside
-    /// of the interval counts as its nearer end. It matters only where lights move, and costs nothing: an [`Emission`] can be
-    /// copied for each photon's time.
+    /// Sets the time at which light leaves, in the shutter interval from 0 to 1; 0 until this sets it, and for NaN. A
+    /// time outside of the interval counts as its nearer end. It matters only where lights move, and costs nothing: an
+    /// [`Emission`] can be copied for each photon's time.
     #[must_use]
     pub fn at_time(mut self, time: f32) -> Self {
         self.scene.lights.time = shutter_time(time);
         self
     }
 
-    /// Makes distant lights send photons as well: into a ball that holds all of the host's scene. Each starts in a disk that
-    /// covers the ball, perpendicular to its direction.
+    /// Makes distant lights send photons as well: into a ball that holds all of the host's scene. Each starts in a disk
+    /// that covers the ball, perpendicular to its direction.
     ///
-    /// The density is per area perpendicular to the direction and, if the light has an extent, per solid angle. So the power of
-    /// a ray is radiance over density, or irradiance over density for a light without an extent. Without distant lights, or
-    /// with a radius that is not positive, nothing changes.
+    /// The density is per area perpendicular to the direction and, if the light has an extent, per solid angle. So the
+    /// power of a ray is radiance over density, or irradiance over density for a light without an extent. Without
+    /// distant lights, or with a radius that is not positive, nothing changes.
     #[must_use]
     pub fn within(mut self, center: Vec3, radius: f32) -> Self {
         let Some(rays) = DistantRays::new(&self.scene.lights, center, radius) else { return self };
@@ -142,8 +142,8 @@ impl<'a> Emission<'a> {
         counted(diffuse_share, diffuse) + counted(through_share, through)
     }
 
-    /// Draws a ray of light. `u` is uniform in `[0, 1)⁵`: the first number chooses the light, the next two the point on it,
-    /// the last two the direction.
+    /// Draws a ray of light. `u` is uniform in `[0, 1)⁵`: the first number chooses the light, the next two the point on
+    /// it, the last two the direction.
     ///
     /// Returns `None` where the drawn direction meets no side of a light that emits; such a `u` counts as a ray without
     /// power.
@@ -177,8 +177,9 @@ impl<'a> Emission<'a> {
         self.sample_beam(direction, 1.0, choice, [b1, b2])
     }
 
-    /// Returns the density with which [`Self::sample`] draws the ray that starts at a point of a light in a unit direction,
-    /// in which light travels: per solid angle, and per area perpendicular to the direction. Zero where it cannot.
+    /// Returns the density with which [`Self::sample`] draws the ray that starts at a point of a light in a unit
+    /// direction, in which light travels: per solid angle, and per area perpendicular to the direction. Zero where it
+    /// cannot.
     #[must_use]
     pub fn pdf(&self, hit: &Hit, direction: Vec3) -> f32 {
         let density = self.scene.lights.leaf_of_hit(hit).map_or(0.0, |leaf| {
@@ -188,10 +189,10 @@ impl<'a> Emission<'a> {
         to_finite(density)
     }
 
-    /// Returns the density with which [`Self::sample`] draws a ray from a light that is not made of triangles, in a unit
-    /// direction in which light travels: per solid angle and, if the light has an extent, per area perpendicular to the
-    /// direction. Zero where it cannot. Which of its points the ray starts from makes no difference, if light leaves it in
-    /// that direction.
+    /// Returns the density with which [`Self::sample`] draws a ray from a light that is not made of triangles, in a
+    /// unit direction in which light travels: per solid angle and, if the light has an extent, per area perpendicular
+    /// to the direction. Zero where it cannot. Which of its points the ray starts from makes no difference, if light
+    /// leaves it in that direction.
     #[must_use]
     pub fn pdf_light(&self, light: LightId, direction: Vec3) -> f32 {
         if let (Some(place), Some((rays, share))) = (self.scene.lights.extras().distant_of(light), &self.distant) {
@@ -203,9 +204,9 @@ impl<'a> Emission<'a> {
         to_finite(leaf.map_or(0.0, density))
     }
 
-    /// Returns the density with which [`Self::sample`] draws a ray that arrives at a point from a unit direction `towards`
-    /// the light, whichever light it started from: the sum over all points that the line crosses. In the measure
-    /// of [`Self::pdf`]; times the cosine at a surface it is a density per area of that surface.
+    /// Returns the density with which [`Self::sample`] draws a ray that arrives at a point from a unit direction
+    /// `towards` the light, whichever light it started from: the sum over all points that the line crosses. In the
+    /// measure of [`Self::pdf`]; times the cosine at a surface it is a density per area of that surface.
     #[must_use]
     pub fn pdf_ray(&self, position: Vec3, towards: Vec3) -> f32 {
         to_finite(self.ray_density(position, towards, None) + self.distant_density(position, towards, None))
@@ -213,9 +214,9 @@ impl<'a> Emission<'a> {
 
     /// Returns [`Self::pdf_ray`] of a ray that [`Self::sample`] has drawn, at the point where it has landed.
     ///
-    /// The point that the ray started from counts with its own density whatever rounding does to the line, so the result is
-    /// never below `ray.pdf`. A ray that starts at a triangle's edge could miss it on the way back. For a ray from a light
-    /// without an extent the result is `ray.pdf`.
+    /// The point that the ray started from counts with its own density whatever rounding does to the line, so the
+    /// result is never below `ray.pdf`. A ray that starts at a triangle's edge could miss it on the way back. For a ray
+    /// from a light without an extent the result is `ray.pdf`.
     #[must_use]
     pub fn pdf_sample_ray(&self, ray: &EmissionSample, landed: Vec3) -> f32 {
         if !ray.has_extent() {

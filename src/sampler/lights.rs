@@ -17,7 +17,8 @@ use crate::visibility::VisibilityView;
 
 /// All lights of a scene, ready to be sampled.
 ///
-/// [`Self::at`] is the door to samples and densities. Sampling reads and never writes, so all threads share one sampler.
+/// [`Self::at`] is the door to samples and densities. Sampling reads and never writes, so all threads share one
+/// sampler.
 #[derive(Clone, Debug)]
 pub struct LightSampler {
     pub(super) tlas: Tlas,
@@ -124,8 +125,8 @@ impl LightSampler {
         self.environment.set_rotation(rotation)
     }
 
-    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them. A triangle of an
-    /// object counts once for each of the object's instances.
+    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them. A triangle
+    /// of an object counts once for each of the object's instances.
     #[must_use]
     pub fn light_count(&self) -> usize {
         self.as_view().light_count()
@@ -163,8 +164,8 @@ impl<'a> LightSamplerView<'a> {
         self.scene.environment
     }
 
-    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them. A triangle of an
-    /// object counts once for each of the object's instances.
+    /// Returns the number of lights that can send anything: triangles, and lights that are not made of them. A triangle
+    /// of an object counts once for each of the object's instances.
     #[must_use]
     pub fn light_count(&self) -> usize {
         let LightScene { tlas, lights, .. } = &self.scene;

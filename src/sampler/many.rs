@@ -19,9 +19,9 @@ impl LightSamplerView<'_> {
     /// memory, and here several walks are interleaved. Where one slice is longer, the rest of it is left alone.
     pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
         for (queries, samples) in queries.chunks(INTERLEAVED).zip(samples.chunks_mut(INTERLEAVED)) {
-            // With bright features a sample is mostly the search for them, and with the environment as a light walks are
-            // few. Lobes are of different kinds, and a step goes down for one kind at a time. Instances have walks of their
-            // own.
+            // With bright features a sample is mostly the search for them, and with the environment as a light walks
+            // are few. Lobes are of different kinds, and a step goes down for one kind at a time. Instances have walks
+            // of their own.
             let is_apart = self.scene.has_more_than_trees() || self.scene.lights.has_instances();
             if is_apart || queries.iter().any(|(x, _)| x.receiver.has_lobe()) {
                 let each = queries.iter().zip(samples);

@@ -13,17 +13,17 @@ use crate::tlas::Splitting;
 use crate::visibility::RegionFactors;
 use crate::warp::{Variate, seed};
 
-/// Distance of the positions of samples of the environment. Chosen: beyond the largest coordinate of a light, 1e9, and of a
-/// shading point, 1e15, and its square is a finite `f32`.
+/// Distance of the positions of samples of the environment. Chosen: beyond the largest coordinate of a light, 1e9, and
+/// of a shading point, 1e15, and its square is a finite `f32`.
 ///
 /// Larger: hosts that square the distance overflow. Smaller: the position could lie in front of something.
 const ENVIRONMENT_DISTANCE: f32 = 1e15;
 
 /// The lights as seen from one shading point: made by [`LightSampler::at`](crate::LightSampler::at).
 ///
-/// What the calls at one point have in common is computed once, by the first of them: above all, which bright features of the
-/// environment are visible through the portals. A sampler belongs to one point and one thread. It costs next to nothing
-/// before its first call.
+/// What the calls at one point have in common is computed once, by the first of them: above all, which bright features
+/// of the environment are visible through the portals. A sampler belongs to one point and one thread. It costs next to
+/// nothing before its first call.
 #[derive(Debug)]
 #[must_use]
 pub struct PointSampler<'a> {
@@ -35,7 +35,8 @@ pub struct PointSampler<'a> {
 impl<'a> PointSampler<'a> {
     /// Returns the sampler of a viewpoint.
     ///
-    /// To be called with a literal, and itself a literal: what goes through a variable is copied, and a sampler is large.
+    /// To be called with a literal, and itself a literal: what goes through a variable is copied, and a sampler is
+    /// large.
     #[inline(always)]
     pub(super) fn new(at: Viewpoint<'a>) -> Self {
         Self { mixture: RefCell::new(Mixture::of_trees()), at }
@@ -61,8 +62,8 @@ impl<'a> PointSampler<'a> {
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the
     /// point on it, so that stratified pairs stay stratified.
     ///
-    /// Returns `None` where nothing can arrive from the part of the lights that `u` leads to; such a `u` counts as a sample
-    /// of zero. The densities of all points integrate to the probability of not getting `None`.
+    /// Returns `None` where nothing can arrive from the part of the lights that `u` leads to; such a `u` counts as a
+    /// sample of zero. The densities of all points integrate to the probability of not getting `None`.
     #[must_use]
     pub fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
         let mixture = self.mixture();
@@ -131,24 +132,24 @@ impl<'a> PointSampler<'a> {
         self.pdf_of_hit(hit, &self.mixture().one())
     }
 
-    /// Returns the density per solid angle with which [`Self::sample`] draws the point that a ray in a unit direction meets of
-    /// a light that is not made of triangles. Zero where it cannot, and for a light without an extent, which no ray meets;
-    /// never infinite.
+    /// Returns the density per solid angle with which [`Self::sample`] draws the point that a ray in a unit direction
+    /// meets of a light that is not made of triangles. Zero where it cannot, and for a light without an extent, which
+    /// no ray meets; never infinite.
     ///
     /// That the ray meets the light is taken from the caller, whose own intersector has found it: rounding may take a
-    /// sampled direction past a small light. Of a distant light with an extent, this is the density of a ray that leaves the
-    /// scene in one of its directions.
+    /// sampled direction past a small light. Of a distant light with an extent, this is the density of a ray that
+    /// leaves the scene in one of its directions.
     #[must_use]
     pub fn pdf_light(&self, light: LightId, direction: Vec3) -> f32 {
         self.pdf_of_lamp(light, direction, &self.mixture().one())
     }
 
-    /// Returns the density per solid angle with which [`Self::sample`] draws this direction of the environment, where that is
-    /// a light ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)). Zero where it cannot; never
-    /// infinite. `direction` need not have unit length.
+    /// Returns the density per solid angle with which [`Self::sample`] draws this direction of the environment, where
+    /// that is a light ([`environment_as_light`](crate::LightSamplerBuilder::environment_as_light)). Zero where it
+    /// cannot; never infinite. `direction` need not have unit length.
     ///
-    /// In a scene without portals and distant lights, this is the density of a ray that has left the scene. It counts the
-    /// environment alone: where the ray can cross portals or lead to a distant light, what a host needs is
+    /// In a scene without portals and distant lights, this is the density of a ray that has left the scene. It counts
+    /// the environment alone: where the ray can cross portals or lead to a distant light, what a host needs is
     /// [`Self::pdf_direction`].
     #[must_use]
     pub fn pdf_environment(&self, direction: Vec3) -> f32 {
@@ -157,8 +158,8 @@ impl<'a> PointSampler<'a> {
 
     /// Returns the probability with which the trees choose this triangle, in `[0, 1]`.
     ///
-    /// Samples towards bright features of the environment that are visible through portals are not counted. Without any,
-    /// this is the probability with which [`Self::sample`] chooses the triangle.
+    /// Samples towards bright features of the environment that are visible through portals are not counted. Without
+    /// any, this is the probability with which [`Self::sample`] chooses the triangle.
     #[must_use]
     pub fn pmf(&self, triangle: TriangleId) -> f32 {
         let leaf = self.at.scene.lights.leaf(triangle).filter(|leaf| self.at.receives(*leaf));
@@ -172,7 +173,8 @@ impl<'a> PointSampler<'a> {
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, leaf) as f32)
     }
 
-    /// Returns the probability with which [`Self::sample`] chooses this light, which is not made of triangles, in `[0, 1]`.
+    /// Returns the probability with which [`Self::sample`] chooses this light, which is not made of triangles, in
+    /// `[0, 1]`.
     #[must_use]
     pub fn pmf_light(&self, light: LightId) -> f32 {
         if let Some(light) = self.at.scene.lights.extras().distant_of(light) {
@@ -182,21 +184,23 @@ impl<'a> PointSampler<'a> {
         leaf.map_or(0.0, |leaf| self.mixture().one().pmf(&self.at, LightLeaf::alone(leaf)) as f32)
     }
 
-    /// Estimates the irradiance at the shading point from all lights together, as if nothing were in between but what learned
-    /// visibility knows of: radiance times the cosine, integrated over directions. At a point with a lobe, the receiver's weight
-    /// stands in for the cosine; in a volume without one it is 1. Never NaN, and zero only where nothing can arrive.
+    /// Estimates the irradiance at the shading point from all lights together, as if nothing were in between but what
+    /// learned visibility knows of: radiance times the cosine, integrated over directions. At a point with a lobe, the
+    /// receiver's weight stands in for the cosine; in a volume without one it is 1. Never NaN, and zero only where
+    /// nothing can arrive.
     ///
     /// It is for a choice between these lights and others that the host samples by itself. It is the estimate that
-    /// [`Self::sample`] is guided by, from moments of clusters: good to some ten percent at most points, and off by more next
-    /// to a large light.
+    /// [`Self::sample`] is guided by, from moments of clusters: good to some ten percent at most points, and off by
+    /// more next to a large light.
     #[must_use]
     pub fn irradiance(&self) -> f32 {
         to_finite(self.mixture().irradiance(&self.at).into())
     }
 
-    /// Returns the density per solid angle with which [`Self::sample`] goes in a direction: the sum over all points of all
-    /// lights that the ray from the shading point crosses, which the crate finds by its own traversal, the distant lights with
-    /// an extent that it leads to, and the environment if it is a light. `direction` need not have unit length.
+    /// Returns the density per solid angle with which [`Self::sample`] goes in a direction: the sum over all points of
+    /// all lights that the ray from the shading point crosses, which the crate finds by its own traversal, the distant
+    /// lights with an extent that it leads to, and the environment if it is a light. `direction` need not have unit
+    /// length.
     #[must_use]
     pub fn pdf_direction(&self, direction: Vec3) -> f32 {
         let mixture = self.mixture();
@@ -209,9 +213,10 @@ impl<'a> PointSampler<'a> {
     /// Returns [`Self::pdf_direction`] of a sample's own direction.
     ///
     /// The sampled point counts with its own density whatever rounding does to the ray, so the result is never below
-    /// `sample.pdf`. Only what else the ray crosses is followed down the trees, so this is faster as well. Where all lights
-    /// lie side by side in one plane, or on the surface of one convex body and face into it, nothing else can be crossed, and
-    /// the result is `sample.pdf`. So it is for a light without an extent, whose `sample.pdf` is a probability.
+    /// `sample.pdf`. Only what else the ray crosses is followed down the trees, so this is faster as well. Where all
+    /// lights lie side by side in one plane, or on the surface of one convex body and face into it, nothing else can be
+    /// crossed, and the result is `sample.pdf`. So it is for a light without an extent, whose `sample.pdf` is a
+    /// probability.
     #[must_use]
     pub fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
         if !sample.has_extent() {
@@ -231,12 +236,13 @@ impl<'a> PointSampler<'a> {
     }
 
     /// Draws one point from each part of the light tree that adaptive splitting visits (Conty Estevez and Kulla 2018,
-    /// section 5.4), one towards a bright feature of the environment if any is visible through a portal, one direction of
-    /// the environment if that is a light, and one of the distant lights if there are any, and adds them to `samples`.
+    /// section 5.4), one towards a bright feature of the environment if any is visible through a portal, one direction
+    /// of the environment if that is a light, and one of the distant lights if there are any, and adds them to
+    /// `samples`.
     ///
-    /// The estimate is the *sum* of `f / pdf` over the samples: `pdf` and `pdf_area` are expected densities, the expected
-    /// number of samples per measure, and `pmf` is the expected number on that triangle. Nothing is allocated but by
-    /// `samples` itself.
+    /// The estimate is the *sum* of `f / pdf` over the samples: `pdf` and `pdf_area` are expected densities, the
+    /// expected number of samples per measure, and `pmf` is the expected number on that triangle. Nothing is allocated
+    /// but by `samples` itself.
     pub fn sample_split(&self, u: [f32; 3], splitting: &Splitting, samples: &mut impl Extend<LightSample>) {
         let salt = seed(&u);
         // Every number gets a key of its own, which distinguishes the draws and the three dimensions.
@@ -273,29 +279,29 @@ impl<'a> PointSampler<'a> {
         samples.extend(self.sample_distant(mixed, &mut variate(last, 0), [variate(last, 1), variate(last, 2)]));
     }
 
-    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a point of a triangle, for
-    /// multiple importance sampling.
+    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a point of a triangle,
+    /// for multiple importance sampling.
     #[must_use]
     pub fn pdf_split(&self, hit: &Hit, splitting: &Splitting) -> f32 {
         self.pdf_of_hit(hit, &self.mixture().side_by_side(splitting))
     }
 
-    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at the point that a ray in a unit
-    /// direction meets of a light that is not made of triangles; see [`Self::pdf_light`].
+    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at the point that a ray in
+    /// a unit direction meets of a light that is not made of triangles; see [`Self::pdf_light`].
     #[must_use]
     pub fn pdf_split_light(&self, light: LightId, direction: Vec3, splitting: &Splitting) -> f32 {
         self.pdf_of_lamp(light, direction, &self.mixture().side_by_side(splitting))
     }
 
-    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a direction of the environment,
-    /// where that is a light.
+    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] at a direction of the
+    /// environment, where that is a light.
     #[must_use]
     pub fn pdf_split_environment(&self, direction: Vec3, splitting: &Splitting) -> f32 {
         to_finite(self.environment_density(direction, &self.mixture().side_by_side(splitting)))
     }
 
-    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] in a direction: the sum over
-    /// all points that the ray crosses, and the environment if it is a light.
+    /// Returns the expected density per solid angle of the samples of [`Self::sample_split`] in a direction: the sum
+    /// over all points that the ray crosses, and the environment if it is a light.
     #[must_use]
     pub fn pdf_split_direction(&self, direction: Vec3, splitting: &Splitting) -> f32 {
         let mixture = self.mixture();

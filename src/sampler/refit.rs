@@ -8,13 +8,13 @@ use crate::record::{InstanceId, LightId};
 impl LightSampler {
     /// Applies changes of meshes without a rebuild.
     ///
-    /// The tree keeps its shape and gets new bounds. Sampling stays exact, but gets noisier the more lights have moved in
-    /// relation to each other; [`Self::decay`] tells when a rebuild pays. Takes time in proportion to the number of all
-    /// lights, however few have changed.
+    /// The tree keeps its shape and gets new bounds. Sampling stays exact, but gets noisier the more lights have moved
+    /// in relation to each other; [`Self::decay`] tells when a rebuild pays. Takes time in proportion to the number of
+    /// all lights, however few have changed.
     ///
     /// A triangle whose area or weight has become zero is never sampled, and comes back if it becomes positive again.
-    /// What emitted nothing when the sampler was built is not in it: black triangles stay black, and a triangle that had no
-    /// area must not get any.
+    /// What emitted nothing when the sampler was built is not in it: black triangles stay black, and a triangle that
+    /// had no area must not get any.
     ///
     /// A sampler that has been [edited](Self::edit) edits this as well.
     ///
@@ -23,8 +23,8 @@ impl LightSampler {
     /// # Errors
     ///
     /// If there is no such mesh, it had another number of triangles, a vertex is not finite or has a coordinate above
-    /// 1e9, there are not as many vertices at the end of the shutter interval, an index has no vertex, a factor or a weight multiplied by it is NaN, negative or above 1e30, or a triangle
-    /// without area has become one with an area.
+    /// 1e9, there are not as many vertices at the end of the shutter interval, an index has no vertex, a factor or a
+    /// weight multiplied by it is NaN, negative or above 1e30, or a triangle without area has become one with an area.
     pub fn refit(&mut self, updates: &[MeshUpdate<'_>]) -> Result<(), Error> {
         if self.edits.is_some() {
             let mut edits = self.edit();
@@ -36,8 +36,8 @@ impl LightSampler {
         Ok(())
     }
 
-    /// Replaces lights that are not made of triangles, without a rebuild: by lights that have moved, have another brightness or
-    /// are of another kind. What holds of [`Self::refit`] holds of this.
+    /// Replaces lights that are not made of triangles, without a rebuild: by lights that have moved, have another
+    /// brightness or are of another kind. What holds of [`Self::refit`] holds of this.
     ///
     /// A light of a radiance or intensity of zero is never sampled, and comes back if it is replaced again.
     ///
@@ -45,9 +45,9 @@ impl LightSampler {
     ///
     /// # Errors
     ///
-    /// If there is no such light, [`add_light`](crate::LightSamplerBuilder::add_light) would refuse the new one, it emits
-    /// and the light that was added emitted nothing, or one of both is a [`DistantLight`](crate::DistantLight) and the other is
-    /// not.
+    /// If there is no such light, [`add_light`](crate::LightSamplerBuilder::add_light) would refuse the new one, it
+    /// emits and the light that was added emitted nothing, or one of both is a [`DistantLight`](crate::DistantLight)
+    /// and the other is not.
     pub fn refit_lights(&mut self, updates: &[(LightId, Lamp)]) -> Result<(), Error> {
         if self.edits.is_some() {
             let mut edits = self.edit();
@@ -59,9 +59,9 @@ impl LightSampler {
         Ok(())
     }
 
-    /// Replaces instances, without a rebuild and without a look at their meshes: by instances of the same objects that are at
-    /// other places or have other factors. What holds of [`Self::refit`] holds of this; the time is in proportion to the number
-    /// of instances, meshes and other lights, and not to that of the triangles in objects.
+    /// Replaces instances, without a rebuild and without a look at their meshes: by instances of the same objects that
+    /// are at other places or have other factors. What holds of [`Self::refit`] holds of this; the time is in
+    /// proportion to the number of instances, meshes and other lights, and not to that of the triangles in objects.
     ///
     /// An instance with a factor of 0 is never sampled, and comes back if it is replaced again.
     ///
@@ -82,11 +82,13 @@ impl LightSampler {
         Ok(())
     }
 
-    /// Returns the cost of the tree in relation to its cost when it was built, by the surface area orientation heuristic.
+    /// Returns the cost of the tree in relation to its cost when it was built, by the surface area orientation
+    /// heuristic.
     ///
-    /// The result is 1 after the build, and after a motion of everything as a whole. At 1.5 samples are noisier by about a
-    /// third than those of a new build, at 2 by about a factor of two: rebuild somewhere in between. [Edits](Self::edit) build
-    /// parts of the tree again by themselves; when they have built all of it, the result is 1 again.
+    /// The result is 1 after the build, and after a motion of everything as a whole. At 1.5 samples are noisier by
+    /// about a third than those of a new build, at 2 by about a factor of two: rebuild somewhere in between.
+    /// [Edits](Self::edit) build parts of the tree again by themselves; when they have built all of it, the result is 1
+    /// again.
     #[must_use]
     pub fn decay(&self) -> f32 {
         (self.cost / self.cost_at_build) as f32

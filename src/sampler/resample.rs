@@ -1,14 +1,15 @@
-//! One of several samples, chosen by a target of the host's: resampled importance sampling (Talbot, Cline and Egbert 2005).
+//! One of several samples, chosen by a target of the host's: resampled importance sampling (Talbot, Cline and Egbert
+//! 2005).
 //!
-//! With M candidates `y_j` of the densities `p(y_j)` and a target `t`, a candidate is chosen in proportion to its weight
-//! `w_j = t(y_j) / p(y_j)`, and gets the contribution weight
+//! With M candidates `y_j` of the densities `p(y_j)` and a target `t`, a candidate is chosen in proportion to its
+//! weight `w_j = t(y_j) / p(y_j)`, and gets the contribution weight
 //!
 //! ```text
 //! W = (w_1 + ... + w_M) / (M t(y))
 //! ```
 //!
-//! For any integrand `f` that is zero wherever the target is, the expectation of `f(y) W` is, first over the choice and then
-//! over the candidates,
+//! For any integrand `f` that is zero wherever the target is, the expectation of `f(y) W` is, first over the choice and
+//! then over the candidates,
 //!
 //! ```text
 //! E[ Σ_j (w_j / Σ w) f(y_j) (Σ w) / (M t(y_j)) ] = E[ 1/M Σ_j f(y_j) / p(y_j) ] = ∫ f
@@ -21,40 +22,41 @@ use crate::math::{at_least, at_most};
 use crate::record::LightSample;
 use crate::warp::{Variate, seed};
 
-/// Least weight of a candidate with a positive target. *Proved*: what underflows stays possible, and the sum of any number of
-/// candidates that there can be is finite.
+/// Least weight of a candidate with a positive target. *Proved*: what underflows stays possible, and the sum of any
+/// number of candidates that there can be is finite.
 const LEAST_WEIGHT: f64 = 1e-200;
 
 /// A sample that was chosen among several candidates: see [`PointSampler::sample_resampled`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ResampledLight {
-    /// The candidate that was chosen. Its densities are those of [`PointSampler::sample`], and *not* those of the choice, which
-    /// nobody knows.
+    /// The candidate that was chosen. Its densities are those of [`PointSampler::sample`], and *not* those of the
+    /// choice, which nobody knows.
     pub sample: LightSample,
-    /// Unbiased contribution weight: what stands in the estimate in the place of one over a density per solid angle. Positive
-    /// and finite.
+    /// Unbiased contribution weight: what stands in the estimate in the place of one over a density per solid angle.
+    /// Positive and finite.
     pub weight: f32,
 }
 
 impl PointSampler<'_> {
-    /// Draws a candidate for each element of `numbers`, as [`sample`](Self::sample) does, and chooses one in proportion to
-    /// `target` over its density. `choice` is uniform in `[0, 1)`.
+    /// Draws a candidate for each element of `numbers`, as [`sample`](Self::sample) does, and chooses one in proportion
+    /// to `target` over its density. `choice` is uniform in `[0, 1)`.
     ///
-    /// The target is the host's: what a candidate is expected to contribute per solid angle if nothing is in between, such as
-    /// luminance of light times BSDF times cosine. It must be positive wherever the true contribution can be. What is negative
-    /// or NaN counts as zero, and an infinite one as a large number. Candidates that are `None` count as well, as zeros.
+    /// The target is the host's: what a candidate is expected to contribute per solid angle if nothing is in between,
+    /// such as luminance of light times BSDF times cosine. It must be positive wherever the true contribution can be.
+    /// What is negative or NaN counts as zero, and an infinite one as a large number. Candidates that are `None` count
+    /// as well, as zeros.
     ///
-    /// The estimate is `f(sample) * weight`, with `f` as it would be divided by the density of a single sample. It is unbiased
-    /// for any number of candidates and any target. A sample on an emitter stands for its point alone. A sample on a portal, or
-    /// on the environment as a light, stands for all that arrives along its direction, as with
+    /// The estimate is `f(sample) * weight`, with `f` as it would be divided by the density of a single sample. It is
+    /// unbiased for any number of candidates and any target. A sample on an emitter stands for its point alone. A
+    /// sample on a portal, or on the environment as a light, stands for all that arrives along its direction, as with
     /// [`pdf_sample_direction`](Self::pdf_sample_direction). The pair of sample and weight is the initial candidate of
     /// reservoir methods (Bitterli et al. 2020).
     ///
-    /// For multiple importance sampling there is no density of the result, and one over the weight must not stand in for it:
-    /// it is random. But the weights of the techniques may be any functions of the direction that add up to 1. So take those of
-    /// the balance heuristic with the density of *one* candidate, multiply both estimates by them, and put the same weight
-    /// into the target if it matters.
+    /// For multiple importance sampling there is no density of the result, and one over the weight must not stand in
+    /// for it: it is random. But the weights of the techniques may be any functions of the direction that add up to 1.
+    /// So take those of the balance heuristic with the density of *one* candidate, multiply both estimates by them, and
+    /// put the same weight into the target if it matters.
     ///
     /// Returns `None` where no candidate has a positive target; that counts as a sample of zero.
     ///

@@ -12,8 +12,8 @@ use crate::technique::{Distances, LightScene, MediumSegment};
 use crate::tlas::Stretch;
 use crate::warp::{Variate, seed};
 
-/// Optical depth beyond which nothing arrives. *Proved*: a share of 1e-26 of the light is left. A smaller one would cut off
-/// what can be seen.
+/// Optical depth beyond which nothing arrives. *Proved*: a share of 1e-26 of the light is left. A smaller one would cut
+/// off what can be seen.
 const DEEPEST: f32 = 60.0;
 
 /// A stretch of a ray in a participating medium that scatters light towards the start of the ray.
@@ -27,7 +27,8 @@ pub struct RaySegment {
     pub direction: Vec3,
     /// Length, which may be infinite where the extinction is positive.
     pub length: f32,
-    /// Extinction coefficient: the share of the light that is lost per length, for short lengths. 0 where all is to be seen.
+    /// Extinction coefficient: the share of the light that is lost per length, for short lengths. 0 where all is to be
+    /// seen.
     pub extinction: f32,
     /// How a direction is weighted at the points of the stretch: [`Receiver::Volume`], or a phase function.
     pub receiver: Receiver,
@@ -90,16 +91,16 @@ pub struct SegmentSample {
     pub distance: f32,
     /// Density of the distance per length. Finite and above zero.
     pub pdf_distance: f32,
-    /// Sample of the lights for the point at this distance. Its densities are those given the distance: the density of both is
-    /// the product with [`Self::pdf_distance`].
+    /// Sample of the lights for the point at this distance. Its densities are those given the distance: the density of
+    /// both is the product with [`Self::pdf_distance`].
     pub light: LightSample,
 }
 
 /// The lights as seen from a stretch of a ray: made by [`LightSampler::along`].
 ///
-/// A distance is chosen by what is expected to arrive there: near lights, by the angle along the ray (equiangular sampling),
-/// where the environment shines in through portals, and by transmittance alone for the rest. Then a
-/// light is chosen as from any point in a medium. Both densities are known for any distance and direction.
+/// A distance is chosen by what is expected to arrive there: near lights, by the angle along the ray (equiangular
+/// sampling), where the environment shines in through portals, and by transmittance alone for the rest. Then a light is
+/// chosen as from any point in a medium. Both densities are known for any distance and direction.
 #[derive(Clone, Debug)]
 #[must_use]
 pub struct SegmentSampler<'a> {
@@ -145,8 +146,8 @@ impl LightSampler {
 }
 
 impl<'a> SegmentSampler<'a> {
-    /// Draws a distance and a light. `u` is uniform in `[0, 1)⁴`: the first number chooses the distance, the others the light as
-    /// in [`PointSampler::sample`].
+    /// Draws a distance and a light. `u` is uniform in `[0, 1)⁴`: the first number chooses the distance, the others the
+    /// light as in [`PointSampler::sample`].
     ///
     /// Returns `None` where nothing arrives; that counts as a sample of zero.
     #[must_use]
@@ -156,23 +157,23 @@ impl<'a> SegmentSampler<'a> {
         Some(SegmentSample { distance, pdf_distance, light })
     }
 
-    /// Draws a distance alone, with its density per length, for hosts that do more than one thing there. `u` is uniform in
-    /// `[0, 1)`. `None` for a segment that is none: without a direction or a length, or with one that is too large.
+    /// Draws a distance alone, with its density per length, for hosts that do more than one thing there. `u` is uniform
+    /// in `[0, 1)`. `None` for a segment that is none: without a direction or a length, or with one that is too large.
     #[must_use]
     pub fn sample_distance(&self, u: f32) -> Option<(f32, f32)> {
         let (distance, pdf) = self.distances.as_ref()?.sample(Variate::new(u, seed(&[u])));
         (pdf > 0.0).then(|| (distance, to_positive(pdf)))
     }
 
-    /// Returns the density per length with which [`Self::sample`] chooses a distance, whatever it finds there. Zero outside of
-    /// the segment.
+    /// Returns the density per length with which [`Self::sample`] chooses a distance, whatever it finds there. Zero
+    /// outside of the segment.
     #[must_use]
     pub fn pdf_distance(&self, distance: f32) -> f32 {
         self.distances.as_ref().map_or(0.0, |distances| to_finite(distances.pdf(distance)))
     }
 
-    /// Returns the density of a distance and a direction from the point there, per length and per solid angle: the product of
-    /// [`Self::pdf_distance`] and [`PointSampler::pdf_direction`].
+    /// Returns the density of a distance and a direction from the point there, per length and per solid angle: the
+    /// product of [`Self::pdf_distance`] and [`PointSampler::pdf_direction`].
     #[must_use]
     pub fn pdf(&self, distance: f32, direction: Vec3) -> f32 {
         let pdf = self.distances.as_ref().map_or(0.0, |distances| distances.pdf(distance));

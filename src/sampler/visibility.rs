@@ -45,11 +45,11 @@ const COVERING_POINTS: u64 = 1 << 18;
 /// (docs/CONSTANTS.md).
 const PASSES: [f64; 3] = [0.25, 0.25, 0.5];
 
-/// Share of the rays of all passes but the first that are drawn as if nothing had been learned. *Measured* on `building`
-/// (docs/CONSTANTS.md).
+/// Share of the rays of all passes but the first that are drawn as if nothing had been learned. *Measured* on
+/// `building` (docs/CONSTANTS.md).
 ///
-/// Larger: more rays to what is hidden. Smaller: what is hidden by the table is asked about seldom, and each report stands for
-/// more, up to the inverse of this.
+/// Larger: more rays to what is hidden. Smaller: what is hidden by the table is asked about seldom, and each report
+/// stands for more, up to the inverse of this.
 const UNLEARNED: f64 = 0.5;
 
 /// Rays that are counted together. *Chosen*: it decides about memory and waiting, not about results.
@@ -72,18 +72,18 @@ impl LightSampler {
 impl<'a> LightSamplerView<'a> {
     /// Returns the same lights, sampled with what is known of walls.
     ///
-    /// Samples, every density, splitting, batches and resampling use the same factors, so that all of them stay unbiased and
-    /// exact for any table, whatever it holds: only noise depends on it. A density belongs to the sampler that it was asked of:
-    /// do not mix those of samplers with different tables, or of one with and one without.
+    /// Samples, every density, splitting, batches and resampling use the same factors, so that all of them stay
+    /// unbiased and exact for any table, whatever it holds: only noise depends on it. A density belongs to the sampler
+    /// that it was asked of: do not mix those of samplers with different tables, or of one with and one without.
     ///
-    /// Rays of light that leave the lights ([`Self::emission`]) are drawn as without a table, and [`Self::to_bytes`] writes the
-    /// lights alone: a table has bytes of its own.
+    /// Rays of light that leave the lights ([`Self::emission`]) are drawn as without a table, and [`Self::to_bytes`]
+    /// writes the lights alone: a table has bytes of its own.
     ///
     /// # Errors
     ///
-    /// If the table was learned for a light tree with another number of nodes or of lights: after a rebuild, learn again. After
-    /// a [`refit`](LightSampler::refit) a table can still be used. The numbers alone are compared. A table of another scene
-    /// that agrees in these makes noise, but no error.
+    /// If the table was learned for a light tree with another number of nodes or of lights: after a rebuild, learn
+    /// again. After a [`refit`](LightSampler::refit) a table can still be used. The numbers alone are compared. A table
+    /// of another scene that agrees in these makes noise, but no error.
     pub fn with_visibility(self, visibility: VisibilityView<'a>) -> Result<Self, Error> {
         let expected = header(&self);
         let differ = |what, found, expected| {
@@ -118,14 +118,14 @@ fn header(lights: &LightSamplerView<'_>) -> VisibilityHeader {
 
 /// Learns what walls hide from what a host reports.
 ///
-/// Rendering and learning alternate. For a pass, each thread takes its own [`VisibilityCounters`] and reports to them which
-/// samples got through. Between two passes the counters are merged, and [`publish`](Self::publish) makes the table of all
-/// reports so far, with which the next pass samples. Counts are integers, so that the table depends neither on the number of
-/// threads nor on the order of merging. Never use a table of a pass to weigh samples of the same pass again: samples, densities
-/// and table belong together.
+/// Rendering and learning alternate. For a pass, each thread takes its own [`VisibilityCounters`] and reports to them
+/// which samples got through. Between two passes the counters are merged, and [`publish`](Self::publish) makes the
+/// table of all reports so far, with which the next pass samples. Counts are integers, so that the table depends
+/// neither on the number of threads nor on the order of merging. Never use a table of a pass to weigh samples of the
+/// same pass again: samples, densities and table belong together.
 ///
-/// The regions of space and orientation that the table distinguishes adapt: [`publish`](Self::publish) divides those with many
-/// reports.
+/// The regions of space and orientation that the table distinguishes adapt: [`publish`](Self::publish) divides those
+/// with many reports.
 ///
 /// ```
 /// use fanlight::{LightSampler, Mesh, ShadingPoint, VisibilityLearner, glam::Vec3};
@@ -167,8 +167,8 @@ pub struct VisibilityLearner {
 
 /// Counts of reports, for one thread and one pass: see [`VisibilityLearner`].
 ///
-/// Memory grows with the number of different pairs of region and light that are reported, by about 20 bytes each. Publish when
-/// [`Self::bytes`] has become too much.
+/// Memory grows with the number of different pairs of region and light that are reported, by about 20 bytes each.
+/// Publish when [`Self::bytes`] has become too much.
 #[derive(Clone, Debug)]
 pub struct VisibilityCounters {
     header: VisibilityHeader,
@@ -180,14 +180,16 @@ pub struct VisibilityCounters {
 }
 
 impl VisibilityCounters {
-    /// Counts one report: that a share of the light of a sample gets to the point that it was drawn for. `transmittance` is in
-    /// `[0, 1]`; NaN counts as 0.
+    /// Counts one report: that a share of the light of a sample gets to the point that it was drawn for.
+    /// `transmittance` is in `[0, 1]`; NaN counts as 0.
     ///
-    /// Report samples whether they got through or not, or only every nth of them; but do not choose by the result. For a sample
-    /// on a portal, what counts is whether the environment is seen along its direction. `here` is the sampler that drew the
-    /// sample. Samples of lights that it does not have, and those at positions that are not finite, are ignored.
+    /// Report samples whether they got through or not, or only every nth of them; but do not choose by the result. For
+    /// a sample on a portal, what counts is whether the environment is seen along its direction. `here` is the sampler
+    /// that drew the sample. Samples of lights that it does not have, and those at positions that are not finite, are
+    /// ignored.
     ///
-    /// If `here` has a table itself, a report costs about as much as the density of a hit; otherwise a few dozen instructions.
+    /// If `here` has a table itself, a report costs about as much as the density of a hit; otherwise a few dozen
+    /// instructions.
     pub fn report(&mut self, here: &PointSampler<'_>, sample: &LightSample, transmittance: f32) {
         let (x, scene) = (&here.at.x, &here.at.scene);
         if scene.tlas.node_count() != self.header.nodes as usize {
@@ -202,8 +204,8 @@ impl VisibilityCounters {
                     LeafKey::feature(leaf.top)
                 } else {
                     if here.at.visibility.is_some() {
-                        // As if the sample had been drawn without the table: else lanes would seem as visible as what the
-                        // table has left of them.
+                        // As if the sample had been drawn without the table: else lanes would seem as visible as what
+                        // the table has left of them.
                         let drawn = scene.tlas.pmf(leaf.top, &here.at, None);
                         let unlearned = scene.tlas.pmf(leaf.top, &here.at.unlearned(), None);
                         let drawn = self.unlearned_share * unlearned + (1.0 - self.unlearned_share) * drawn;
@@ -264,8 +266,8 @@ impl VisibilityLearner {
         }
     }
 
-    /// Sets the number of bytes that the entries of a table take at most, three MiB by default. Of more entries than that,
-    /// those that matter least are left out.
+    /// Sets the number of bytes that the entries of a table take at most, three MiB by default. Of more entries than
+    /// that, those that matter least are left out.
     #[must_use]
     pub fn max_bytes(mut self, bytes: usize) -> Self {
         self.max_bytes = bytes;
@@ -342,14 +344,15 @@ impl VisibilityLearner {
 impl Visibility {
     /// Learns what walls hide, by rays of its own.
     ///
-    /// `points(i)` is the i-th point that light is gathered at, for any `i` below `rays`: for example a random point on a random
-    /// surface, or a list that is repeated. The regions of the table are where these points are. `transmittance` says which
-    /// share, in `[0, 1]`, of the light of a sample gets to such a point: for a sample on a portal or of the environment, of the
-    /// light that comes along its direction. Each of the `rays` asks for it once, many of them for samples drawn with what the
-    /// ones before have found. One hundred rays for each region of a square meter or so make a useful table, one thousand a good
-    /// one.
+    /// `points(i)` is the i-th point that light is gathered at, for any `i` below `rays`: for example a random point on
+    /// a random surface, or a list that is repeated. The regions of the table are where these points are.
+    /// `transmittance` says which share, in `[0, 1]`, of the light of a sample gets to such a point: for a sample on a
+    /// portal or of the environment, of the light that comes along its direction. Each of the `rays` asks for it once,
+    /// many of them for samples drawn with what the ones before have found. One hundred rays for each region of a
+    /// square meter or so make a useful table, one thousand a good one.
     ///
-    /// The result does not depend on the number of threads. With the feature `rayon` both functions are called by several.
+    /// The result does not depend on the number of threads. With the feature `rayon` both functions are called by
+    /// several.
     ///
     /// A tree without nodes (a single light) has nothing to learn, and the table is empty.
     ///
@@ -365,8 +368,8 @@ impl Visibility {
         learn(lights, rays, &points, &transmittance, None)
     }
 
-    /// Learns as [`Self::learn`] does, for hosts that show progress or that need to be able to cancel: `report` is called with
-    /// the share of the rays that are done, and [`ControlFlow::Break`] cancels.
+    /// Learns as [`Self::learn`] does, for hosts that show progress or that need to be able to cancel: `report` is
+    /// called with the share of the rays that are done, and [`ControlFlow::Break`] cancels.
     ///
     /// # Errors
     ///

@@ -1,8 +1,8 @@
 //! Distant lights: directions that are known beforehand.
 //!
-//! Each light is weighed by what it sends to the shading point ([`DistantRecord::weigh`]), which is known but for walls: a
-//! light below the horizon has the weight zero. Of more lights than [`MOST_GROUPS`], a group of neighbors is chosen first, and
-//! its lights are weighed only then.
+//! Each light is weighed by what it sends to the shading point ([`DistantRecord::weigh`]), which is known but for
+//! walls: a light below the horizon has the weight zero. Of more lights than [`MOST_GROUPS`], a group of neighbors is
+//! chosen first, and its lights are weighed only then.
 //!
 //! Like [`Sky`](super::sky::Sky), this technique draws directions. But a direction belongs to one light, and each has a
 //! density of its own: caps may overlap.
@@ -14,8 +14,8 @@ use crate::light::{DistantGroup, DistantRecord, MOST_GROUPS};
 use crate::math::only_if;
 use crate::warp::{Variate, keep_positive, pick, pmf, sum};
 
-/// Distant lights as seen from one shading point: no more than what balances them with the rest, as every shading point has
-/// room for it. Weights are computed anew for each question.
+/// Distant lights as seen from one shading point: no more than what balances them with the rest, as every shading point
+/// has room for it. Weights are computed anew for each question.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distant {
     irradiance: f32,
@@ -69,8 +69,8 @@ impl Distant {
         pmf_in(at, &weights(at), index, light)
     }
 
-    /// Returns the density per solid angle with which [`Self::sample`] draws a unit direction that leads to a light with an
-    /// extent.
+    /// Returns the density per solid angle with which [`Self::sample`] draws a unit direction that leads to a light
+    /// with an extent.
     pub(super) fn pdf(&self, at: &Viewpoint<'_>, light: usize, direction: Vec3) -> f64 {
         let Some(record) = at.scene.lights.extras().distants().get(light).filter(|record| record.has_extent()) else {
             return 0.0;

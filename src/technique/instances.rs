@@ -1,7 +1,7 @@
 //! What the tree over all lights leaves open where its leaves are instances: which of the object's triangles.
 //!
-//! The choice of an instance is followed by a walk through the object's own tree, and a probability is the product of both.
-//! Scenes without instances ask once whether there are any.
+//! The choice of an instance is followed by a walk through the object's own tree, and a probability is the product of
+//! both. Scenes without instances ask once whether there are any.
 
 use glam::Vec3;
 
@@ -32,8 +32,8 @@ impl LightScene<'_> {
         }
     }
 
-    /// Calls `visit` for each light whose box may hold a point in a cone around a unit vector, with an angular radius of this
-    /// sine and cosine.
+    /// Calls `visit` for each light whose box may hold a point in a cone around a unit vector, with an angular radius
+    /// of this sine and cosine.
     #[inline(always)]
     pub(super) fn meet(&self, origin: Vec3, axis: Vec3, cone: [f32; 2], mut visit: impl FnMut(LightLeaf)) {
         if self.lights.has_instances() {
@@ -53,7 +53,8 @@ impl LightScene<'_> {
         }
     }
 
-    /// Calls `visit` for the light in a leaf; if that is an instance, for those of its triangles that `among` passes on.
+    /// Calls `visit` for the light in a leaf; if that is an instance, for those of its triangles that `among` passes
+    /// on.
     #[inline]
     pub(super) fn visit_within(
         &self,
@@ -69,8 +70,8 @@ impl LightScene<'_> {
 }
 
 impl Viewpoint<'_> {
-    /// Draws a light. Returns it with its probability; `None` where nothing can arrive from the part of the lights that `u`
-    /// leads to. `first` are the weights of the tree's first choice, if they are known.
+    /// Draws a light. Returns it with its probability; `None` where nothing can arrive from the part of the lights that
+    /// `u` leads to. `first` are the weights of the tree's first choice, if they are known.
     #[inline(always)]
     pub(super) fn choose(&self, first: Option<&FirstWeights>, u: Variate) -> Option<(LightLeaf, f64)> {
         if self.scene.lights.has_instances() {
@@ -86,8 +87,8 @@ impl Viewpoint<'_> {
         self.choose_within(leaf, pmf, || u)
     }
 
-    /// Draws a light of a leaf that has been chosen with this probability, or is visited this many times: the light itself, or
-    /// a triangle of the instance that it is.
+    /// Draws a light of a leaf that has been chosen with this probability, or is visited this many times: the light
+    /// itself, or a triangle of the instance that it is.
     #[inline]
     pub(crate) fn choose_within(&self, leaf: u32, pmf: f64, u: impl FnOnce() -> Variate) -> Option<(LightLeaf, f64)> {
         if !self.scene.lights.has_instances() {

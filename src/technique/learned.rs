@@ -1,4 +1,5 @@
-//! What is known of the region of a shading point: how much of each light, and of each part of the environment, gets there.
+//! What is known of the region of a shading point: how much of each light, and of each part of the environment, gets
+//! there.
 
 use super::Viewpoint;
 use crate::env::{REGIONS, RegionSums};
@@ -19,8 +20,8 @@ impl Viewpoint<'_> {
         self.visibility.as_ref()?.get(node).map(|factors| &factors.0)
     }
 
-    /// Returns the factor in `(0, 1]` for bright features that are seen through a portal: that of the nearest entry on the way
-    /// from its leaf to the root, first of those for features, then of those for all.
+    /// Returns the factor in `(0, 1]` for bright features that are seen through a portal: that of the nearest entry on
+    /// the way from its leaf to the root, first of those for features, then of those for all.
     #[inline(never)]
     pub(super) fn feature_factor(&self, region: &RegionFactors<'_>, leaf: u32) -> f32 {
         let (mut of_features, mut of_all) = (None, None);

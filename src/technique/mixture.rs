@@ -21,19 +21,19 @@ const LEAST_TREES: f32 = 0.02;
 /// The same next to a portal: what is seen through it differs so much from place to place that neither the estimate of
 /// the trees nor their choices are as good there.
 ///
-/// Measured on star (docs/ACCURACY.md, "Where it is still weak"): without it one point 6 mm from the card has 21 times the
-/// variance; everywhere, a tenth costs the window with sun 20 times its variance.
+/// Measured on star (docs/ACCURACY.md, "Where it is still weak"): without it one point 6 mm from the card has 21 times
+/// the variance; everywhere, a tenth costs the window with sun 20 times its variance.
 const LEAST_TREES_CLOSE: f32 = 0.2;
 
 /// Largest estimate of an irradiance, so that sums of two stay finite. Proved: twice this is below `f32::MAX`.
 const MAX_IRRADIANCE: f32 = 1e35;
 
-/// Least probability of the environment next to the lights, and of the lights next to the environment; and of distant lights
-/// next to both. Estimates know of no walls: the environment may be all but hidden where a lamp is not, and a lamp where the
-/// environment is not.
+/// Least probability of the environment next to the lights, and of the lights next to the environment; and of distant
+/// lights next to both. Estimates know of no walls: the environment may be all but hidden where a lamp is not, and a
+/// lamp where the environment is not.
 ///
-/// Measured on the host bench's street (docs/CONSTANTS.md). A larger value wastes samples where one of both outshines the
-/// other; with a smaller one, what is dark by the estimates alone is noisier, by the inverse of this.
+/// Measured on the host bench's street (docs/CONSTANTS.md). A larger value wastes samples where one of both outshines
+/// the other; with a smaller one, what is dark by the estimates alone is noisier, by the inverse of this.
 const LEAST_BESIDE: f64 = 0.1;
 
 /// Probability of one of two techniques that do not know each other's walls, by estimates of the irradiance from both.
@@ -181,8 +181,8 @@ impl Mixture {
         Mixed { trees: Trees { first: self.first.as_ref(), splitting: None }, mixture: self, shares: self.shares }
     }
 
-    /// Returns the mixture for a split tree: the trees in any case, and next to them one feature and one direction of the
-    /// environment, if that is a light.
+    /// Returns the mixture for a split tree: the trees in any case, and next to them one feature and one direction of
+    /// the environment, if that is a light.
     pub(crate) fn side_by_side<'m>(&'m self, splitting: &'m Splitting) -> Mixed<'m> {
         let features = self.features.as_ref().map_or(0.0, |features| 1.0 / features.total());
         let trees = Trees { first: self.first.as_ref(), splitting: Some(splitting) };
@@ -208,7 +208,8 @@ pub(crate) struct Mixed<'m> {
 }
 
 impl Mixed<'_> {
-    /// Chooses between the environment as a light and the lights that are somewhere. Returns whether it is the environment.
+    /// Chooses between the environment as a light and the lights that are somewhere. Returns whether it is the
+    /// environment.
     #[inline(always)]
     pub(crate) fn chooses_sky(&self, choice: &mut Variate) -> bool {
         if self.mixture.sky.is_none() {
@@ -219,7 +220,8 @@ impl Mixed<'_> {
         pick_pair([share, 1.0 - share], choice) == 0
     }
 
-    /// Chooses between distant lights and all else. Returns whether it is a distant light. Asked before all other choices.
+    /// Chooses between distant lights and all else. Returns whether it is a distant light. Asked before all other
+    /// choices.
     #[inline(always)]
     pub(crate) fn chooses_distant(&self, choice: &mut Variate) -> bool {
         if self.mixture.distant.is_none() {

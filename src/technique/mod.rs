@@ -3,8 +3,8 @@
 //! A [`Technique`] estimates the irradiance that it accounts for, draws a point on a light and knows the density of any
 //! point. [`Mixture`] chooses among the techniques in proportion to their estimates; a density is that of the mixture,
 //! whichever technique drew the point. There are two: the [trees](trees), and the [bright features](features) of the
-//! environment as the portals show them. Two more draw directions instead of points: the environment [itself](sky), where
-//! it is a light, and [distant] lights.
+//! environment as the portals show them. Two more draw directions instead of points: the environment [itself](sky),
+//! where it is a light, and [distant] lights.
 
 mod distant;
 mod features;
@@ -47,8 +47,8 @@ impl Variates {
 /// The density of a point by one technique.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Density {
-    /// Probability of the light as such, or the expected number of visits where the tree is split. Zero for a technique that
-    /// does not choose a light first.
+    /// Probability of the light as such, or the expected number of visits where the tree is split. Zero for a technique
+    /// that does not choose a light first.
     pub(crate) pmf: f64,
     /// Per solid angle at the shading point, times [`Technique::total`].
     pub(crate) pdf: f64,
@@ -64,12 +64,12 @@ pub(crate) struct PlacedPoint {
 
 /// One way to choose a point on the lights.
 pub(crate) trait Technique {
-    /// Returns what the densities of this technique integrate to. What they are divided by is left to the mixture, so that
-    /// estimates of irradiances serve as probabilities as they are.
+    /// Returns what the densities of this technique integrate to. What they are divided by is left to the mixture, so
+    /// that estimates of irradiances serve as probabilities as they are.
     fn total(&self) -> f64;
 
-    /// Draws a point on a light, and passes it on together with its density and the light as seen from the shading point.
-    /// `None` where nothing can arrive from the part of the lights that the variates lead to.
+    /// Draws a point on a light, and passes it on together with its density and the light as seen from the shading
+    /// point. `None` where nothing can arrive from the part of the lights that the variates lead to.
     ///
     /// The result is passed on rather than returned because a light's view is large.
     fn sample<R>(

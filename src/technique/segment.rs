@@ -1,11 +1,12 @@
 //! Distances along a ray in a medium, by the light that is expected to arrive there.
 //!
-//! The density of a distance is a mixture of three, so that it is known for any distance, whichever of them has drawn it:
+//! The density of a distance is a mixture of three, so that it is known for any distance, whichever of them has drawn
+//! it:
 //!
-//! - *clusters*: of clusters of lights, by the angle that the stretch subtends at each over its distance from the ray, and
-//!   equiangularly within (Kulla and Fajardo 2012, section 4.1);
-//! - *beams*: what the environment sends through portals, in bins along the ray: bright features by the shadows of the portals,
-//!   and the rest of an image by probes, the trees' own estimate at a few points;
+//! - *clusters*: of clusters of lights, by the angle that the stretch subtends at each over its distance from the ray,
+//!   and equiangularly within (Kulla and Fajardo 2012, section 4.1);
+//! - *beams*: what the environment sends through portals, in bins along the ray: bright features by the shadows of the
+//!   portals, and the rest of an image by probes, the trees' own estimate at a few points;
 //! - *even*: by the transmittance alone, for all that arrives everywhere, and for what the others miss.
 
 use core::f64::consts::PI;
@@ -33,7 +34,8 @@ const PROBES: usize = 16;
 const MOST_FEATURES: usize = 4;
 /// Most portals that the beams of a feature are followed through. *Chosen*: a budget of time.
 ///
-/// Larger: lattices of many triangles cost more. Smaller: beams through their last triangles are left to the even share.
+/// Larger: lattices of many triangles cost more. Smaller: beams through their last triangles are left to the even
+/// share.
 const MOST_PORTALS: u32 = 256;
 /// Least probability of the even share, and of each of the others where it finds anything. Estimates know of no walls.
 /// *Chosen*, not swept; as for the environment next to the lights.
@@ -277,8 +279,8 @@ fn only_light(scene: &LightScene<'_>, stretch: &Stretch) -> Option<ClusterAlong>
     ClusterAlong::new(&moments, stretch)
 }
 
-/// Returns the distances between which a portal is in a direction, a unit vector, from the points of a stretch; `None` if from
-/// no point, or for any other light.
+/// Returns the distances between which a portal is in a direction, a unit vector, from the points of a stretch; `None`
+/// if from no point, or for any other light.
 fn shadow(scene: &LightScene<'_>, leaf: u32, stretch: &Stretch, toward: Vec3) -> Option<[f64; 2]> {
     let (vertices, two_sided) = scene.lights.portal(leaf)?;
     let origin = stretch.origin.as_dvec3();

@@ -1,12 +1,13 @@
 //! The environment as one more light: directions that no portal leads to.
 //!
-//! The sphere is divided into 64 regions ([`RegionMoments`]). The weight of a region is what it sends to the shading point,
-//! as far as walls are left aside, and the sum of all weights is the estimate of the irradiance. A region is chosen by its
-//! weight, and a direction in it by radiance alone. Only where the horizon of the receiver cuts a region are the next levels
-//! of the pyramid weighed by the receiver as well, so that hardly a direction below the horizon is drawn.
+//! The sphere is divided into 64 regions ([`RegionMoments`]). The weight of a region is what it sends to the shading
+//! point, as far as walls are left aside, and the sum of all weights is the estimate of the irradiance. A region is
+//! chosen by its weight, and a direction in it by radiance alone. Only where the horizon of the receiver cuts a region
+//! are the next levels of the pyramid weighed by the receiver as well, so that hardly a direction below the horizon is
+//! drawn.
 //!
-//! A direction is no point of a triangle. This technique therefore draws and weighs directions, and the mixture adds its
-//! density where a ray leaves the scene.
+//! A direction is no point of a triangle. This technique therefore draws and weighs directions, and the mixture adds
+//! its density where a ray leaves the scene.
 
 use glam::Vec3;
 
@@ -19,9 +20,9 @@ use crate::receiver::{Receiver, ReceiverKind};
 use crate::simd::{InstructionSet, Kernel};
 use crate::warp::{Variate, keep_positive};
 
-/// Levels of the pyramid below a region that are weighed by the receiver where the horizon cuts the region. *Measured* on the
-/// host bench's street (docs/CONSTANTS.md): 0 and 3 are as good there. Chosen for suns at the horizon, which are in texels of
-/// six degrees then.
+/// Levels of the pyramid below a region that are weighed by the receiver where the horizon cuts the region. *Measured*
+/// on the host bench's street (docs/CONSTANTS.md): 0 and 3 are as good there. Chosen for suns at the horizon, which are
+/// in texels of six degrees then.
 ///
 /// Larger: slower in these regions. Smaller: more samples below the horizon.
 const CUT_LEVELS: u32 = 2;
@@ -98,8 +99,8 @@ impl Sky {
         place.map_or(0.0, |place| place.density(environment, environment.mean_in(depth, texel)))
     }
 
-    /// Goes down from a region to the last texel that is weighed by the receiver. `choose` gets a depth, the texel of the
-    /// level above and the weights of the four texels below it, and returns one of these.
+    /// Goes down from a region to the last texel that is weighed by the receiver. `choose` gets a depth, the texel of
+    /// the level above and the weights of the four texels below it, and returns one of these.
     #[inline(always)]
     fn walk(
         &self,

@@ -68,8 +68,8 @@ impl Technique for Trees<'_> {
     }
 }
 
-/// Estimates the irradiance that the trees account for: without the environment's bright features. `first` are the weights
-/// of the tree's first choice, if the tree has nodes. Zero only where nothing can arrive.
+/// Estimates the irradiance that the trees account for: without the environment's bright features. `first` are the
+/// weights of the tree's first choice, if the tree has nodes. Zero only where nothing can arrive.
 pub(super) fn irradiance(at: &Viewpoint<'_>, first: Option<&FirstWeights>) -> f32 {
     if let Some(first) = first {
         let (energy, sum) = (at.scene.lights.energy, first.sum());

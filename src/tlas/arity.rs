@@ -2,10 +2,10 @@
 
 /// Number of children of a node of the tree over triangles.
 ///
-/// The wider a node, the more children compete in one choice, so that choices are better and walks are shorter; but
-/// all lanes are computed, whether they are used or not. Without AVX, [`Arity::Eight`] may be faster than the default. Where
-/// a narrower node holds all lights of a scene, the tree gets the least arity that does.
-/// The arity is a property of the built sampler and is kept in its bytes.
+/// The wider a node, the more children compete in one choice, so that choices are better and walks are shorter; but all
+/// lanes are computed, whether they are used or not. Without AVX, [`Arity::Eight`] may be faster than the default.
+/// Where a narrower node holds all lights of a scene, the tree gets the least arity that does. The arity is a property
+/// of the built sampler and is kept in its bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[repr(u32)]

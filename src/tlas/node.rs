@@ -5,9 +5,9 @@ use glam::Vec3;
 
 /// Bit of [`Node::normals`] that marks a two-sided light. *Format.*
 pub(super) const LANE_TWO_SIDED: u32 = 1 << 31;
-/// Bit of [`Node::normals`] that marks a child whose lights do not all send over the hemisphere around their normal. With
-/// [`WIDE`], some of them send in all directions. With any other code of [`Node::tangents`], all of them send into the cone of
-/// that code alone: the cone of normals, widened by the angle at which light leaves. *Format.*
+/// Bit of [`Node::normals`] that marks a child whose lights do not all send over the hemisphere around their normal.
+/// With [`WIDE`], some of them send in all directions. With any other code of [`Node::tangents`], all of them send into
+/// the cone of that code alone: the cone of normals, widened by the angle at which light leaves. *Format.*
 pub(super) const LANE_SHAPED: u32 = 1 << 30;
 /// Largest component of a normal, in the ten bits that it has. *Format.*
 pub(super) const NORMAL_STEPS: f32 = 511.0;
@@ -17,9 +17,9 @@ pub(super) const WIDE: u8 = u8::MAX;
 pub(super) const ALL: u8 = u8::MAX;
 /// Largest code of a mean position, at the side of the box. *Format.*
 pub(super) const MEAN_STEPS: f32 = 127.0;
-/// Number of steps per unit of the square root of the tangent of a cone's half angle. The root makes the codes of narrow cones
-/// finer. *Format*: with 254 steps, tangents end at 15.8, which is above the tangent of
-/// `WIDEST_CONE`; smaller steps could not reach it, larger ones widen all cones.
+/// Number of steps per unit of the square root of the tangent of a cone's half angle. The root makes the codes of
+/// narrow cones finer. *Format*: with 254 steps, tangents end at 15.8, which is above the tangent of `WIDEST_CONE`;
+/// smaller steps could not reach it, larger ones widen all cones.
 pub(super) const TANGENT_STEPS: f32 = 64.0;
 
 /// Up to `N` children, in few bits each (after Ylitie, Karras and Laine 2017): first other nodes, which are neighbours
@@ -145,7 +145,8 @@ impl<const N: usize> Node<N> {
         [flux, portal]
     }
 
-    /// Returns the cone of normals of a lane, by its axis and the sine and cosine of its half angle, and the mean normal.
+    /// Returns the cone of normals of a lane, by its axis and the sine and cosine of its half angle, and the mean
+    /// normal.
     pub(super) fn cone(&self, lane: usize) -> (Vec3, [f32; 2], Vec3) {
         let normal = self.normals[lane];
         let axis = Vec3::from_array([0, 1, 2].map(|axis| Self::component(normal, axis))).normalize_or_zero();
@@ -170,8 +171,8 @@ impl<const N: usize> Node<N> {
         self.normals[lane] & LANE_TWO_SIDED != 0
     }
 
-    /// Returns the least and largest coordinates of all boxes, by axis. Each is rounded once, so that a box still holds what it
-    /// was made for.
+    /// Returns the least and largest coordinates of all boxes, by axis. Each is rounded once, so that a box still holds
+    /// what it was made for.
     #[inline(always)]
     pub(super) fn corners(&self) -> ([[f32; N]; 3], [[f32; N]; 3]) {
         let (origin, steps, centers, halves) = (self.origin, self.steps, self.centers, self.halves);
@@ -216,8 +217,8 @@ pub(crate) struct Slot(u32);
 impl Slot {
     /// Slot of the root, which no lane refers to.
     pub(super) const ROOT: Self = Self(u32::MAX);
-    /// Slot of a place that an edit has left free. Nothing refers to the place, and bytes hold none. *Format*: as many nodes as
-    /// have a slot of this number are never built.
+    /// Slot of a place that an edit has left free. Nothing refers to the place, and bytes hold none. *Format*: as many
+    /// nodes as have a slot of this number are never built.
     pub(super) const FREE: Self = Self(u32::MAX - 1);
 
     pub(super) fn new<const N: usize>(node: usize, lane: usize) -> Self {

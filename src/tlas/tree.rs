@@ -22,8 +22,8 @@ buffers! {
         arity: Arity,
     }
     buffers {
-        /// Nodes of the arity, as words: the root first, and a child always after its parent. Empty where there is no leaf
-        /// or a single one.
+        /// Nodes of the arity, as words: the root first, and a child always after its parent. Empty where there is no
+        /// leaf or a single one.
         nodes: u32 = b"NODE" version 1,
         /// Parent of each node.
         parents: Slot = b"PARE" version 1,

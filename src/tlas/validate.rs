@@ -5,9 +5,8 @@ use super::node::{Child, Node, Slot, wide};
 use super::tree::{TlasView, WideTree, for_arity};
 use crate::error::Error;
 
-/// Largest coordinate and largest step of a box. *Proved*: with codes of a byte, squares of distances stay below 1e36 and so
-/// finite. Hosts
-/// keep below 1e9; a smaller bound would refuse nothing that is built.
+/// Largest coordinate and largest step of a box. *Proved*: with codes of a byte, squares of distances stay below 1e36
+/// and so finite. Hosts keep below 1e9; a smaller bound would refuse nothing that is built.
 const FARTHEST: f32 = 1e15;
 
 impl TlasView<'_> {

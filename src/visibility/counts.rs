@@ -75,8 +75,8 @@ impl Counts {
     /// Least number of records that are sorted. *Chosen*: a few pages.
     const LEAST: usize = 1 << 12;
 
-    /// Adds one report: the transmittance in `[0, 1]`, and how often the light is asked about without a table relative to how
-    /// often it was.
+    /// Adds one report: the transmittance in `[0, 1]`, and how often the light is asked about without a table relative
+    /// to how often it was.
     pub(crate) fn report(&mut self, region: u32, leaf: LeafKey, transmittance: f32, weight: f32) {
         let weight = crate::math::limit(weight, MAX_WEIGHT);
         let asked = ((weight * UNIT + 0.5) as u32).max(1);

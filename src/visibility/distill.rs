@@ -1,14 +1,14 @@
 //! From counts to factors: shares that got through, shrunk towards what is known of more.
 //!
-//! A report of a leaf counts for each lane on the way from the root to the leaf. The share `q` of a lane is the share of its
-//! reports that got through, as if [`PRIOR`] further reports had come out as expected. What is expected is the share of the
-//! node itself, corrected by what the surrounding regions know: first all reports of an orientation are looked at, then those of
-//! ever smaller groups of regions, each with the group before as its prior.
+//! A report of a leaf counts for each lane on the way from the root to the leaf. The share `q` of a lane is the share
+//! of its reports that got through, as if [`PRIOR`] further reports had come out as expected. What is expected is the
+//! share of the node itself, corrected by what the surrounding regions know: first all reports of an orientation are
+//! looked at, then those of ever smaller groups of regions, each with the group before as its prior.
 //!
-//! The factor is the *root* of the share. A light that gets through to a part `q` of a region, and whose unhidden contribution
-//! is `f`, has the second moment `q f²` there. Over all lights, the expected square of the estimate `Σ q f² / p` is least for
-//! `p` in proportion to `f √q`. The factor of a lane with lanes below it is the mean of theirs, so that it says the same of a
-//! lamp behind a wall and one in the room as of both apart.
+//! The factor is the *root* of the share. A light that gets through to a part `q` of a region, and whose unhidden
+//! contribution is `f`, has the second moment `q f²` there. Over all lights, the expected square of the estimate
+//! `Σ q f² / p` is least for `p` in proportion to `f √q`. The factor of a lane with lanes below it is the mean of
+//! theirs, so that it says the same of a lamp behind a wall and one in the room as of both apart.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -22,8 +22,8 @@ use crate::tlas::{FACTORS as LANES, TlasView};
 
 /// Number of reports that the expectation counts as.
 ///
-/// *Measured* on `building` (docs/CONSTANTS.md). Larger: a lane needs more reports to differ from what surrounds it. Smaller:
-/// few reports decide, and what they have missed by chance becomes noise.
+/// *Measured* on `building` (docs/CONSTANTS.md). Larger: a lane needs more reports to differ from what surrounds it.
+/// Smaller: few reports decide, and what they have missed by chance becomes noise.
 const PRIOR: f32 = 2.0;
 
 /// Levels of the tree over regions from one prior to the next. *Measured* on `building` (docs/CONSTANTS.md).
@@ -31,7 +31,8 @@ const PRIOR: f32 = 2.0;
 /// Larger: less time to publish, and a coarser prior. Smaller: the reverse.
 const PRIOR_LEVELS: u32 = 2;
 
-/// Least share. A light that got through nowhere is still chosen with the root of this, 0.7 %, of its weight without a table.
+/// Least share. A light that got through nowhere is still chosen with the root of this, 0.7 %, of its weight without a
+/// table.
 ///
 /// *Measured* on `building` (docs/CONSTANTS.md). Larger: more samples of what is hidden. Smaller: what was missed while
 /// learning is noisier, by the inverse of the root.

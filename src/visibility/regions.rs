@@ -1,7 +1,7 @@
 //! Regions of space and orientation, divided where reports are.
 //!
-//! Each orientation has a tree of planes perpendicular to the axes. A region is divided in the middle of the longest side of
-//! the box around its reports, so that empty space costs a few planes at most, however large the scene.
+//! Each orientation has a tree of planes perpendicular to the axes. A region is divided in the middle of the longest
+//! side of the box around its reports, so that empty space costs a few planes at most, however large the scene.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -170,8 +170,8 @@ impl RegionBuilder {
         self.extents.fill(Extent::EMPTY);
     }
 
-    /// Returns the nodes as a table holds them, with regions numbered anew: `number` returns the new number, or `None` for a
-    /// region of which nothing is known. What is far from all reports is in no region.
+    /// Returns the nodes as a table holds them, with regions numbered anew: `number` returns the new number, or `None`
+    /// for a region of which nothing is known. What is far from all reports is in no region.
     pub(crate) fn freeze(&self, number: impl Fn(u32) -> Option<u32>) -> Vec<RegionNode> {
         let nothing = RegionNode { kind: NOTHING, plane: 0.0, first: 0 };
         let mut nodes = vec![nothing; ORIENTATIONS];
@@ -220,5 +220,6 @@ impl RegionBuilder {
 
 /// How far regions reach beyond all reports, relative to the extent of these. *Chosen.*
 ///
-/// Larger: what was learned at the edge holds farther away. Smaller: points next to those that were reported have no region.
+/// Larger: what was learned at the edge holds farther away. Smaller: points next to those that were reported have no
+/// region.
 const MARGIN: f32 = 0.01;

@@ -11,8 +11,8 @@ use crate::error::Error;
 use crate::receiver::ShadingPoint;
 use crate::tlas::{FactorBytes, factor};
 
-/// Factors of a node's lanes, each a byte `b` that stands for ((b + 1) / 256)² ([`factor`]): from 1.5e-5 to 1, finest near zero. *Format*,
-/// and the proof that no factor is zero.
+/// Factors of a node's lanes, each a byte `b` that stands for ((b + 1) / 256)² ([`factor`]): from 1.5e-5 to 1, finest
+/// near zero. *Format*, and the proof that no factor is zero.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct Factors(pub(crate) FactorBytes);
@@ -49,8 +49,8 @@ const _: () = assert!(size_of::<RegionNode>() == 12);
 pub(crate) const REGION: u32 = 3;
 /// Marks a node that is outside of all regions. *Format.*
 pub(crate) const NOTHING: u32 = 4;
-/// Number of orientations, each of which has a root of its own: the six directions of the axes, and points without a side.
-/// *Format.*
+/// Number of orientations, each of which has a root of its own: the six directions of the axes, and points without a
+/// side. *Format.*
 pub(crate) const ORIENTATIONS: usize = 7;
 
 /// What a table was learned for.
@@ -69,8 +69,8 @@ impl VisibilityHeader {
 }
 
 buffers! {
-    /// What walls hide, as far as it has been learned: a factor for each child of a node of the light tree, by regions of space
-    /// and orientation. See [`LightSampler::with_visibility`](crate::LightSampler::with_visibility).
+    /// What walls hide, as far as it has been learned: a factor for each child of a node of the light tree, by regions
+    /// of space and orientation. See [`LightSampler::with_visibility`](crate::LightSampler::with_visibility).
     ///
     /// A table is frozen: sampling reads it and never writes. It is made by [`Visibility::learn`](Self::learn), or by a
     /// [`VisibilityLearner`](crate::VisibilityLearner) from what a host reports while it renders.
@@ -157,8 +157,8 @@ impl<'a> VisibilityView<'a> {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Returns the table as bytes, to be written to disk, mapped or shared, and to be read by [`Self::from_bytes`] on a machine
-    /// of the same byte order.
+    /// Returns the table as bytes, to be written to disk, mapped or shared, and to be read by [`Self::from_bytes`] on a
+    /// machine of the same byte order.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let header = [self.header];
@@ -168,12 +168,14 @@ impl<'a> VisibilityView<'a> {
         write(&sections)
     }
 
-    /// Borrows a table from bytes that [`Self::to_bytes`] wrote, without a copy. `bytes` must start at a multiple of four.
+    /// Borrows a table from bytes that [`Self::to_bytes`] wrote, without a copy. `bytes` must start at a multiple of
+    /// four.
     ///
     /// # Errors
     ///
-    /// If the bytes are not aligned, are cut off, are of another version or byte order, or hold anything that sampling could
-    /// stumble over. Bytes from an untrusted source are safe to load. Any factors are valid: bad ones only make noise.
+    /// If the bytes are not aligned, are cut off, are of another version or byte order, or hold anything that sampling
+    /// could stumble over. Bytes from an untrusted source are safe to load. Any factors are valid: bad ones only make
+    /// noise.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut sections = Sections::new(bytes)?;
         let header =

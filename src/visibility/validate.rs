@@ -4,8 +4,8 @@ use super::table::{NOTHING, ORIENTATIONS, REGION, VisibilityView};
 use crate::error::Error;
 
 impl VisibilityView<'_> {
-    /// Checks that the trees over regions lead forward and end in regions, and that the entries of each region are in order.
-    /// Every factor is good.
+    /// Checks that the trees over regions lead forward and end in regions, and that the entries of each region are in
+    /// order. Every factor is good.
     pub(super) fn validate(&self) -> Result<(), Error> {
         let Some((&end, _)) = self.starts.split_last() else {
             return Err(Error::bytes("starts of regions", 0, 0, 1));

@@ -57,8 +57,8 @@ pub(crate) fn sphere_to_square(direction: Vec3) -> Vec2 {
     Vec2::new(place(u, direction.x), place(v, direction.y))
 }
 
-/// Largest coordinate that [`sphere_to_square_quickly`] returns. *Proved*: it is in the last texel of every level that a
-/// pyramid may have, 2^13 texels a side.
+/// Largest coordinate that [`sphere_to_square_quickly`] returns. *Proved*: it is in the last texel of every level that
+/// a pyramid may have, 2^13 texels a side.
 ///
 /// Larger than 1 - 2^-13 only: points at the edge would lie in no texel. Smaller: more points are moved.
 const LAST: f32 = 1.0 - 1.0 / 131_072.0;

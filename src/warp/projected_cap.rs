@@ -1,10 +1,11 @@
 //! Unit square to the part of a spherical cap above a plane, by the cosine to the plane's normal.
 //!
-//! A uniform point of the cap's projection onto the plane is a direction with a density of its cosine (Nusselt). A cap that the
-//! plane does not cut projects to an ellipse. One that it cuts projects to what lies between the inner side of that ellipse
-//! and the unit circle (after Peters and Dachsbacher 2019, "Sampling projected spherical caps in real time"). Across the
-//! ellipse, the coordinate is drawn as for the whole ellipse; along it, uniformly. The density is that of both: exactly the
-//! cosine's for a cap that is not cut, and near it for one that is. It changes gradually from the one to the other.
+//! A uniform point of the cap's projection onto the plane is a direction with a density of its cosine (Nusselt). A cap
+//! that the plane does not cut projects to an ellipse. One that it cuts projects to what lies between the inner side of
+//! that ellipse and the unit circle (after Peters and Dachsbacher 2019, "Sampling projected spherical caps in real
+//! time"). Across the ellipse, the coordinate is drawn as for the whole ellipse; along it, uniformly. The density is
+//! that of both: exactly the cosine's for a cap that is not cut, and near it for one that is. It changes gradually from
+//! the one to the other.
 //!
 //! A cap of more than a hemisphere projects to the unit disk without what the rest of the sphere projects to.
 
@@ -16,13 +17,13 @@ use glam::DVec3;
 use super::spherical_cap::SphericalCap;
 use crate::math;
 
-/// Least sine of the half angle of a cap that is projected. *Proved*: directions in single precision, 6e-8, resolve it to a
-/// hundredth. Larger: caps of that size at the horizon are drawn below it as well. Smaller: densities of rounded directions
-/// would be those of others.
+/// Least sine of the half angle of a cap that is projected. *Proved*: directions in single precision, 6e-8, resolve it
+/// to a hundredth. Larger: caps of that size at the horizon are drawn below it as well. Smaller: densities of rounded
+/// directions would be those of others.
 const LEAST_SINE: f64 = 1e-5;
 
-/// Least sine of the angle between the axis of a cap and the normal. *Proved*: rounding of 1e-16 turns a direction found from
-/// a smaller sine by more than 1e-6. A larger one would move caps.
+/// Least sine of the angle between the axis of a cap and the normal. *Proved*: rounding of 1e-16 turns a direction
+/// found from a smaller sine by more than 1e-6. A larger one would move caps.
 const LEAST_TILT: f64 = 1e-10;
 
 /// Share of the cap's width that is kept off its two ends, where the density may be infinite.

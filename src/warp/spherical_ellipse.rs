@@ -1,10 +1,10 @@
 //! Unit square to a spherical ellipse: the directions of an elliptic cone, such as those to a disk.
 //!
-//! With tangents a and b of the half angles along two axes, the rim of the cone is `(a cos ψ, b sin ψ, 1)`. In the angle ψ
-//! and the cosine to the axis, the solid angle is `a b / s (s + 1) dψ`, where `s² = 1 + a² cos² ψ + b² sin² ψ`, times
-//! the share of the cosine. Angles are drawn by `1 / (A cos² ψ + B sin² ψ)`, whose integral is an arc tangent, with A and B the
-//! values of `s (s + 1)` on the axes. The two differ by a factor from 0.82 to 1, so the density is nearly uniform, however
-//! flat or wide the cone; for round cones and for narrow ones it is uniform.
+//! With tangents a and b of the half angles along two axes, the rim of the cone is `(a cos ψ, b sin ψ, 1)`. In the
+//! angle ψ and the cosine to the axis, the solid angle is `a b / s (s + 1) dψ`, where `s² = 1 + a² cos² ψ + b² sin² ψ`,
+//! times the share of the cosine. Angles are drawn by `1 / (A cos² ψ + B sin² ψ)`, whose integral is an arc tangent,
+//! with A and B the values of `s (s + 1)` on the axes. The two differ by a factor from 0.82 to 1, so the density is
+//! nearly uniform, however flat or wide the cone; for round cones and for narrow ones it is uniform.
 
 use core::f32::consts::TAU;
 
@@ -48,7 +48,8 @@ impl SphericalEllipse {
         e * (x * radius) + f * (y * radius) + axis * (1.0 - height)
     }
 
-    /// Returns the density per solid angle with which [`Self::direction`] maps uniform input to a direction of the cone.
+    /// Returns the density per solid angle with which [`Self::direction`] maps uniform input to a direction of the
+    /// cone.
     pub(crate) fn pdf(&self, direction: DVec3) -> f64 {
         let [a, b] = self.tangents;
         let [first, second] = self.ends();

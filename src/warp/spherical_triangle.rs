@@ -1,15 +1,15 @@
 //! The equal-area map between the unit square and a spherical triangle.
 //!
-//! Arvo, "Stratified Sampling of Spherical Triangles", SIGGRAPH 1995, rearranged so that nothing cancels at small or large
-//! angles. With the corners `a`, `b`, `c`, the angle α at `a` and the side `c` from `a` to `b`, the part of the triangle that
-//! an arc from `b` to the side across from it cuts off has the excess `x = u Ω` where the arc ends at the distance `b'` from
-//! `a`, with
+//! Arvo, "Stratified Sampling of Spherical Triangles", SIGGRAPH 1995, rearranged so that nothing cancels at small or
+//! large angles. With the corners `a`, `b`, `c`, the angle α at `a` and the side `c` from `a` to `b`, the part of the
+//! triangle that an arc from `b` to the side across from it cuts off has the excess `x = u Ω` where the arc ends at the
+//! distance `b'` from `a`, with
 //!
 //! `tan(b'/2) = sin(x/2) / (tan(c/2) sin(α - x/2))`.
 //!
-//! Along that arc equal steps of `1 - cos θ`, with θ counted from `b`, are equal areas, and `1 - cos θ = |e - b|² / 2` at its
-//! end `e`. The trigonometric functions are polynomials of this file, so that the bits of a result do not depend on the
-//! library that the float functions come from.
+//! Along that arc equal steps of `1 - cos θ`, with θ counted from `b`, are equal areas, and `1 - cos θ = |e - b|² / 2`
+//! at its end `e`. The trigonometric functions are polynomials of this file, so that the bits of a result do not depend
+//! on the library that the float functions come from.
 
 use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
@@ -17,8 +17,8 @@ use glam::DVec3;
 
 use crate::math::{at_least, sqrt, sqrt64};
 
-/// Least sum of squares that columns divide by. *Proved*: it is a normal `f32`, and below what any triangle of a solid angle
-/// of 1e-8 has.
+/// Least sum of squares that columns divide by. *Proved*: it is a normal `f32`, and below what any triangle of a solid
+/// angle of 1e-8 has.
 ///
 /// Larger: columns of small triangles would be wrong. Smaller: a quotient could be infinite.
 const LEAST_SQUARE: f32 = 1e-36;
@@ -58,8 +58,9 @@ pub(crate) struct SphericalColumns {
 impl SphericalTriangle {
     /// Returns the triangle that is seen of a flat one with these corners, of any distance from the origin.
     ///
-    /// `determinant` is that of the corners, positive. It is passed in because it cannot be computed from the corners without
-    /// cancellation where the origin is almost in the triangle's plane. `None` where the solid angle is not positive.
+    /// `determinant` is that of the corners, positive. It is passed in because it cannot be computed from the corners
+    /// without cancellation where the origin is almost in the triangle's plane. `None` where the solid angle is not
+    /// positive.
     #[inline(always)]
     pub(crate) fn new(corners: [DVec3; 3], determinant: f64) -> Option<Self> {
         let inverse = corners.map(|corner| 1.0 / sqrt64(corner.length_squared()));
@@ -98,7 +99,8 @@ impl SphericalTriangle {
         self.a.cross(self.c)
     }
 
-    /// Returns the direction of a point of the unit square. `u` divides the triangle into columns, `v` a column into rows.
+    /// Returns the direction of a point of the unit square. `u` divides the triangle into columns, `v` a column into
+    /// rows.
     #[inline(always)]
     pub(crate) fn direction(&self, [u, v]: [f64; 2]) -> DVec3 {
         let (s, k) = sin_cos(0.5 * u * self.solid_angle);
@@ -116,8 +118,8 @@ impl SphericalTriangle {
         if direction.is_finite() { direction } else { self.b }
     }
 
-    /// Returns the point of the unit square of a unit direction. Outside of the triangle it is outside of the square, or near
-    /// its edge.
+    /// Returns the point of the unit square of a unit direction. Outside of the triangle it is outside of the square,
+    /// or near its edge.
     #[inline(always)]
     pub(crate) fn invert(&self, direction: DVec3) -> [f64; 2] {
         // The great circle through b and the direction crosses that of a and c in a x + across y, up to the sign.
@@ -136,7 +138,8 @@ impl SphericalTriangle {
         [u, v]
     }
 
-    /// Writes `COUNT` columns from the column `START` on, whose centers have the `u` of `first`, `first + step`, and so on.
+    /// Writes `COUNT` columns from the column `START` on, whose centers have the `u` of `first`, `first + step`, and so
+    /// on.
     #[inline(always)]
     pub(crate) fn columns<const START: usize, const COUNT: usize>(
         &self,

@@ -27,8 +27,8 @@ pub(crate) fn triangle_to_square(b: [f64; 2]) -> [f64; 2] {
 /// Larger: time. Smaller: points that do not follow the density.
 const NEWTON_STEPS: usize = 3;
 
-/// Maps `u` in `[0, 1]²` to the barycentric coordinates `[b1, b2]` of a point of the triangle, so that uniform input gives
-/// points of the density that is linear between these positive weights of the corners.
+/// Maps `u` in `[0, 1]²` to the barycentric coordinates `[b1, b2]` of a point of the triangle, so that uniform input
+/// gives points of the density that is linear between these positive weights of the corners.
 ///
 /// `u[0]` divides the triangle by lines parallel to the side across from the first corner, `u[1]` along a line.
 #[inline]
@@ -60,7 +60,8 @@ pub(crate) fn linear_pdf([b1, b2]: [f64; 2], [w0, w1, w2]: [f64; 3]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The points of a fine grid of the square fall into each of the cells of a coarse one of the triangle by its integral.
+    /// The points of a fine grid of the square fall into each of the cells of a coarse one of the triangle by its
+    /// integral.
     #[test]
     fn linear_points_follow_their_density() {
         for weights in

@@ -295,8 +295,8 @@ fn the_density_of_a_direction_counts_every_portal() {
     assert!(both > 1000 && one > 1000, "{both} {one}");
 }
 
-/// A window that faces the dark part of a sky of such a contrast that the dark relative to the mean is nothing in single
-/// precision.
+/// A window that faces the dark part of a sky of such a contrast that the dark relative to the mean is nothing in
+/// single precision.
 #[test]
 fn what_is_dark_next_to_a_very_bright_sky_is_sampled() {
     let window = LightMesh::quad(Vec3::new(-0.02, -0.02, 1.0), 0.04 * Vec3::Y, 0.04 * Vec3::X).portal();

@@ -133,8 +133,8 @@ fn a_build_can_be_cancelled() {
     assert!(nothing.is_err_and(|error| error.is_cancelled()));
 }
 
-/// Many triangles, each with coordinates of its own, over a small image, whose memory does not suffice for all, and over
-/// a large one.
+/// Many triangles, each with coordinates of its own, over a small image, whose memory does not suffice for all, and
+/// over a large one.
 fn textured<'a>(small: &'a [f32], large: &'a [f32]) -> LightSamplerBuilder<'a> {
     let mut builder = LightSampler::builder();
     let images = [Texture::new(16, 16, small), Texture::new(256, 256, large)].map(|t| t.expect("texels are finite"));

@@ -1,5 +1,5 @@
-//! Distant lights: irradiance against integrals in double precision that know nothing of the crate, normalization, histograms,
-//! agreement, bytes, photons and gradual changes.
+//! Distant lights: irradiance against integrals in double precision that know nothing of the crate, normalization,
+//! histograms, agreement, bytes, photons and gradual changes.
 
 use core::f64::consts::{PI, TAU};
 
@@ -115,8 +115,8 @@ fn tilted(toward: DVec3, angle: f64) -> Vec3 {
     (toward * angle.cos() + s * angle.sin()).as_vec3()
 }
 
-/// Each radius over, across and below the horizon: samples bring the irradiance of an integral, and where all of a light is
-/// above the horizon, each brings all of it.
+/// Each radius over, across and below the horizon: samples bring the irradiance of an integral, and where all of a
+/// light is above the horizon, each brings all of it.
 #[test]
 fn samples_bring_the_irradiance_of_an_integral() {
     let mut pcg = Pcg32::new(1, 161);
@@ -177,8 +177,8 @@ fn densities_integrate_to_the_rate_of_samples() {
     }
 }
 
-/// Directions of samples in equal parts of the sphere fall as the density of directions says, caps on top of each other and
-/// on the sky.
+/// Directions of samples in equal parts of the sphere fall as the density of directions says, caps on top of each other
+/// and on the sky.
 #[test]
 fn directions_fall_as_the_density_says() {
     const BANDS: usize = 20;

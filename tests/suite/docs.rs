@@ -30,8 +30,8 @@ fn is_name(word: &str) -> bool {
     starts_well && !is_extension && (is_camel || is_split)
 }
 
-/// Names in the code spans of a text in Markdown, each with its line. What is a path, the ending of one, an option or a name
-/// with hyphens is none. Blocks of code are left to the compiler.
+/// Names in the code spans of a text in Markdown, each with its line. What is a path, the ending of one, an option or a
+/// name with hyphens is none. Blocks of code are left to the compiler.
 fn names(text: &str) -> Vec<(usize, String)> {
     let mut found = Vec::new();
     let mut is_block = false;

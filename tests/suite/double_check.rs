@@ -1,7 +1,7 @@
 //! The densities of very many samples of random scenes: as many as the environment variable `SAMPLES` asks for.
 //!
-//! `SAMPLES=1e9 cargo test --release --test suite -- double_check --ignored --nocapture`; with `FIRST=3400` before it, from that
-//! scene on.
+//! `SAMPLES=1e9 cargo test --release --test suite -- double_check --ignored --nocapture`; with `FIRST=3400` before it,
+//! from that scene on.
 
 use core::fmt::Write;
 use std::path::Path;

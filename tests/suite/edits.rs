@@ -16,7 +16,8 @@ use fanlight::{
 use glam::{Affine3A, Vec3};
 use world::World;
 
-/// A shading point that every light of a world can send to: in a volume, which two-sided lights and spheres always reach.
+/// A shading point that every light of a world can send to: in a volume, which two-sided lights and spheres always
+/// reach.
 fn volume(pcg: &mut Pcg32) -> ShadingPoint {
     ShadingPoint::volume(4.0 * Vec3::from_array(pcg.cube()) - 2.0)
 }

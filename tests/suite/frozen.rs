@@ -1,7 +1,7 @@
 //! Bytes that an earlier build wrote load, and mean what they meant.
 //!
-//! `FROZEN=write cargo test --test suite frozen` writes the files from the scenes below. That is for new scenes alone: a file that
-//! is committed stays as it is, whatever the crate becomes.
+//! `FROZEN=write cargo test --test suite frozen` writes the files from the scenes below. That is for new scenes alone:
+//! a file that is committed stays as it is, whatever the crate becomes.
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! The bits of samples and densities at fixed seeds: whoever changes one should have meant to.
 //!
-//! `GOLDEN=write cargo test golden` writes down what is found. Angles come from the system's library of functions
-//! or, without `std`, from `libm`, so that there is a list for each, and they hold for the system that they were made on.
+//! `GOLDEN=write cargo test golden` writes down what is found. Angles come from the system's library of functions or,
+//! without `std`, from `libm`, so that there is a list for each, and they hold for the system that they were made on.
 use std::path::Path;
 
 use crate::common::hostile::{random_scene, shading_point, shading_point_with_lobe, shading_point_with_microfacets};

@@ -1,5 +1,5 @@
-//! Light groups: what a point does not receive is never sampled and has the density zero, all else is as exact as ever, and
-//! what is left out starves nothing.
+//! Light groups: what a point does not receive is never sampled and has the density zero, all else is as exact as ever,
+//! and what is left out starves nothing.
 
 use crate::common::lights::{ARITIES, aligned, sample_split};
 use crate::common::pcg::Pcg32;
@@ -98,8 +98,8 @@ fn again(lights: &LightSampler, x: &ShadingPoint, sample: &LightSample) -> (f32,
     }
 }
 
-/// Samples are of lights that the point receives, their densities are found again, and are zero at points that do not receive
-/// the light.
+/// Samples are of lights that the point receives, their densities are found again, and are zero at points that do not
+/// receive the light.
 #[test]
 fn what_is_not_received_is_never_sampled() {
     let (mut drawn, mut left_out) = (0, 0);

@@ -184,8 +184,8 @@ fn the_irradiance_is_that_of_an_integral() {
     check_irradiance(173, &some(120), |number| [0, 1, 3][number % 3]);
 }
 
-/// The probabilities of all triangles add up to that of a choice, and the densities of all points integrate to the share of
-/// samples that are no `None`.
+/// The probabilities of all triangles add up to that of a choice, and the densities of all points integrate to the
+/// share of samples that are no `None`.
 #[test]
 fn densities_integrate_to_the_rate_of_samples() {
     let rounds = some(30);
@@ -253,7 +253,8 @@ fn histograms_over_triangles_are_the_probabilities() {
             });
             observed[index] += 1.0;
         }
-        // The probability of a triangle counts points below the horizon of which no sample comes: only what was drawn counts.
+        // The probability of a triangle counts points below the horizon of which no sample comes: only what was drawn
+        // counts.
         let none = observed.pop().expect("the last one");
         let drawn: f64 = expected.iter().sum();
         expected.push((count as f64 - drawn).max(0.0));

@@ -1,8 +1,8 @@
 //! Estimates are unbiased: they agree with an integral in double precision that knows nothing of the crate.
 //!
-//! Each point is within four standard errors. With 220 points, the full tier, chance alone breaks that in one run of seventy; as the
-//! seeds are fixed, it either does or does not. A point that is off is done again with ten times the samples, which
-//! tells bias from chance.
+//! Each point is within four standard errors. With 220 points, the full tier, chance alone breaks that in one run of
+//! seventy; as the seeds are fixed, it either does or does not. A point that is off is done again with ten times the
+//! samples, which tells bias from chance.
 
 use crate::common::lights::{ARITIES, build, sample_split};
 use crate::common::pcg::Pcg32;

@@ -1,5 +1,6 @@
-//! Lights that are not made of triangles, alone and mixed with meshes and portals: irradiance against integrals in double
-//! precision that know nothing of the crate, normalization, histograms, agreement, hostile places, bytes and photons.
+//! Lights that are not made of triangles, alone and mixed with meshes and portals: irradiance against integrals in
+//! double precision that know nothing of the crate, normalization, histograms, agreement, hostile places, bytes and
+//! photons.
 
 use core::f64::consts::{PI, TAU};
 
@@ -643,8 +644,8 @@ fn variance_changes_gradually_with_the_size_of_a_light() {
     assert_gradual("height over a sphere", |gap| with(vec![sphere((0.1 + gap) * Vec3::Z, 0.1)]), [1e-4, 1e3]);
 }
 
-/// Lights that move, change their brightness or their kind: what is sampled is what a new build would sample, and densities
-/// agree.
+/// Lights that move, change their brightness or their kind: what is sampled is what a new build would sample, and
+/// densities agree.
 #[test]
 fn lights_are_replaced_without_a_rebuild() {
     let mut pcg = Pcg32::new(19, 151);

@@ -12,9 +12,9 @@ const LEVELS: [&[&str]; 6] = [
     &["technique"],
     &["sampler"],
 ];
-/// The float functions stand in for those of the standard library, so geometry may use them although it is a sibling, and
-/// one of them is a machine instruction. Readers of bytes fail with the one error type, and a build
-/// that is cancelled does.
+/// The float functions stand in for those of the standard library, so geometry may use them although it is a sibling,
+/// and one of them is a machine instruction. Readers of bytes fail with the one error type, and a build that is
+/// cancelled does.
 const EXCEPTIONS: [(&str, &str); 4] =
     [("geometry", "math"), ("math", "simd"), ("buffers", "error"), ("error", "progress")];
 /// Not part of the house.

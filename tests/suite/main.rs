@@ -1,6 +1,7 @@
 //! All acceptance tests, in one binary. They know the crate by its public interface alone.
 //!
-//! `cargo test NAME` runs a module or a test: `cargo test golden`, `cargo test layering`. Sizes are in [`common::tier`].
+//! `cargo test NAME` runs a module or a test: `cargo test golden`, `cargo test layering`. Sizes are in
+//! [`common::tier`].
 
 #![expect(clippy::incompatible_msrv, reason = "the crate alone is built with its oldest compiler")]
 

@@ -154,7 +154,8 @@ fn the_irradiance_is_that_of_an_integral_at_all_times() {
     assert!(3 * lit > rounds.len(), "only {lit} points are lit");
 }
 
-/// A lamp that turns by 60 degrees and goes by, far from the origin as well: its irradiance at each time and over the interval.
+/// A lamp that turns by 60 degrees and goes by, far from the origin as well: its irradiance at each time and over the
+/// interval.
 #[test]
 fn a_lamp_turns() {
     let found = parallel::map(4, |number| {
@@ -374,8 +375,8 @@ fn photons_leave_at_their_time() {
     }
 }
 
-/// Distances along a segment at a time, through a window that moves: densities integrate to 1, and what is scattered in is that
-/// of distances that are drawn evenly.
+/// Distances along a segment at a time, through a window that moves: densities integrate to 1, and what is scattered in
+/// is that of distances that are drawn evenly.
 #[test]
 fn segments_have_a_time() {
     for number in 0..4 {

@@ -1,4 +1,5 @@
-//! Triangles without a texture have no cliffs: not next to the shading point, and not where they are divided more finely.
+//! Triangles without a texture have no cliffs: not next to the shading point, and not where they are divided more
+//! finely.
 
 use crate::common::pcg::Pcg32;
 use fanlight::{Environment, EnvironmentImage, LightSampler, Mesh, Receiver, ShadingPoint};

@@ -17,8 +17,8 @@ const TOLERANCE: f64 = 1e-4;
 const RESOLVED: f64 = 5e-3;
 /// Significance of all scenes together.
 const SIGNIFICANCE: f64 = 0.01;
-/// How much coarser the integral over a scene of so many triangles is. Among many of them, the density takes all kinds of
-/// cells.
+/// How much coarser the integral over a scene of so many triangles is. Among many of them, the density takes all kinds
+/// of cells.
 const COARSER: f64 = 5.0;
 const MANY: usize = 100;
 /// Triangles that together have less probability than this are left out.
@@ -34,8 +34,8 @@ struct Found {
     missed: usize,
 }
 
-/// Integral of the density over all triangles, and five standard errors of what it resolves by random places alone, where
-/// the density varies over less than it divides.
+/// Integral of the density over all triangles, and five standard errors of what it resolves by random places alone,
+/// where the density varies over less than it divides.
 fn integral(
     scene: &Scene,
     lights: &LightSampler,
@@ -189,8 +189,8 @@ fn check_resolved(found: &[Found], least: f64) {
 }
 
 /// Everywhere else the shortfall is the rate of `None`. Each scene's binomial test has Šidák's share of 1 %. `least` is
-/// how many points there must be to make this a test that always give a sample, that never do, and that are between; of a
-/// part of the points, a part.
+/// how many points there must be to make this a test that always give a sample, that never do, and that are between; of
+/// a part of the points, a part.
 fn check_elsewhere(slow: bool, first: usize, some: fn(usize) -> Vec<usize>, least: [usize; 3]) {
     let contents = contents(false, slow);
     let numbers = some(3 * contents.len());
@@ -243,7 +243,8 @@ fn with_the_least_effort_the_shortfall_is_the_rate_of_none() {
 
 #[test]
 fn with_microfacets_the_shortfall_is_the_rate_of_none() {
-    // Their densities take long to integrate: single triangles through glass, and in the full tier a third of the others.
+    // Their densities take long to integrate: single triangles through glass, and in the full tier a third of the
+    // others.
     let fewer = |count: usize| {
         if tier().stride > 1 { vec![1, 4] } else { few(count).into_iter().step_by(3).collect() }
     };

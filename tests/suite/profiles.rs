@@ -1,4 +1,5 @@
-//! Lights with profiles: intensities against a second table lookup, choices against exact irradiances, photons, bytes, errors.
+//! Lights with profiles: intensities against a second table lookup, choices against exact irradiances, photons, bytes,
+//! errors.
 
 use core::f32::consts::{FRAC_PI_2, PI, TAU};
 

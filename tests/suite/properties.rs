@@ -109,8 +109,8 @@ fn build(soup: &Soup, texels: &[f32], sky: &[f32], scale: f32) -> LightSampler {
     builder.build().expect("there are few triangles")
 }
 
-/// Checks a property in as many cases as the tier says. The property returns how many things it has compared: `least` of
-/// them a case, on average, or it has shown nothing.
+/// Checks a property in as many cases as the tier says. The property returns how many things it has compared: `least`
+/// of them a case, on average, or it has shown nothing.
 fn check<S: Strategy>(strategy: S, least: f64, property: impl Fn(S::Value) -> Result<usize, TestCaseError>) {
     let cases = tier().cases;
     let config = Config { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..Config::with_cases(cases) };

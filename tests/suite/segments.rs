@@ -1,5 +1,5 @@
-//! Stretches of rays in media: densities of distances, radiance scattered in against integrals in double precision, and how
-//! much there is to gain.
+//! Stretches of rays in media: densities of distances, radiance scattered in against integrals in double precision, and
+//! how much there is to gain.
 
 use crate::common::pcg::Pcg32;
 use crate::common::statistics::{Mean, chi_square, sidak};
@@ -157,7 +157,8 @@ fn distances_fall_as_the_density_says() {
     }
 }
 
-/// What a sample of both brings: light scattered in, without anything in between and without loss on the way to the segment.
+/// What a sample of both brings: light scattered in, without anything in between and without loss on the way to the
+/// segment.
 fn brought(along: &SegmentSampler<'_>, segment: &RaySegment, u: [f32; 4]) -> f64 {
     along.sample(u).map_or(0.0, |sample| {
         let transmittance = f64::from(-segment.extinction * sample.distance).exp();

@@ -1,4 +1,5 @@
-//! What was built one by one, used together: instances, lights of every kind, light groups, learned visibility, lobes, media.
+//! What was built one by one, used together: instances, lights of every kind, light groups, learned visibility, lobes,
+//! media.
 
 use fanlight::{
     DistantLight, Environment, Filter, Glossy, Hit, Instance, InstanceId, LightSample, LightSampler, LightSamplerView,
@@ -22,8 +23,8 @@ fn sky() -> Environment {
     Environment::from_lat_long(64, 32, &texels, Filter::Nearest).expect("a good image")
 }
 
-/// Twelve instances of a lamp of two triangles and a window above it, two spheres, a point, and two distant lights. Only what is
-/// in some of `groups` is added; everything keeps its numbers, as the rest is there without light.
+/// Twelve instances of a lamp of two triangles and a window above it, two spheres, a point, and two distant lights.
+/// Only what is in some of `groups` is added; everything keeps its numbers, as the rest is there without light.
 fn scene(groups: u32) -> LightSampler {
     let corners = [[-0.2, -0.2, 0.0], [-0.2, 0.2, 0.0], [0.2, 0.2, 0.0], [0.2, -0.2, 0.0]].map(Vec3::from);
     let above = corners.map(|corner| 2.0 * corner + vec3(0.1, 0.0, 0.5));

@@ -138,9 +138,9 @@ fn estimate(lights: &LightSamplerView<'_>, x: &ShadingPoint, count: usize, pcg: 
     [mean, (squares / count - mean * mean) / count, drawn / count]
 }
 
-/// The irradiance by samples with any table is that without one. Factors as small as 1.5e-5 make so much noise that a mean over
-/// thousands of samples falls short of what a few rare ones bring; so tables are compared whose noise can be seen through. What
-/// the others do to densities is in the tests around this one.
+/// The irradiance by samples with any table is that without one. Factors as small as 1.5e-5 make so much noise that a
+/// mean over thousands of samples falls short of what a few rare ones bring; so tables are compared whose noise can be
+/// seen through. What the others do to densities is in the tests around this one.
 #[test]
 fn estimates_are_unbiased_for_any_table() {
     let scenes = few(125);

@@ -15,7 +15,8 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// Returns a camera at a position, with a point in the middle of its image and a horizontal field of view in degrees.
+    /// Returns a camera at a position, with a point in the middle of its image and a horizontal field of view in
+    /// degrees.
     pub(crate) fn new(position: Vec3, target: Vec3, up: Vec3, field_of_view: f32) -> Self {
         let backward = (position - target).normalize();
         let right = up.cross(backward).normalize();

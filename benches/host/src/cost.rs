@@ -19,8 +19,8 @@ const VERTICES: usize = 4096;
 const WARM_UP: usize = 512;
 /// Repetitions, of which the median counts.
 const REPEATS: usize = 9;
-/// Samples after which a vertex counts as one that no light reaches. *Measured*: with 64 the share of lit vertices changes
-/// by less than 1 %.
+/// Samples after which a vertex counts as one that no light reaches. *Measured*: with 64 the share of lit vertices
+/// changes by less than 1 %.
 const TRIES: u32 = 16;
 /// Walks through all pixels after which the search for vertices ends.
 const MOST_WALKS: usize = 16;

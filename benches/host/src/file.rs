@@ -15,7 +15,8 @@ const KEY: f32 = 0.35;
 /// Red, green, blue and white of linear sRGB, in CIE xy; *format*, from Rec. ITU-R BT.709.
 const SRGB: [[f64; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
 
-/// Reads an `OpenEXR` file. Colors of other primaries are converted to those of linear sRGB, without adaptation of the white.
+/// Reads an `OpenEXR` file. Colors of other primaries are converted to those of linear sRGB, without adaptation of the
+/// white.
 pub(crate) fn read_exr(path: &Path) -> Result<Image, Error> {
     let read = exr::prelude::read_first_rgba_layer_from_file(
         path,

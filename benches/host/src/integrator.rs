@@ -9,8 +9,8 @@ use crate::methods::{Lighting, LightsHere, Proposal, Target};
 use crate::random::Pcg32;
 use crate::world::{Meeting, World};
 
-/// How far behind an emitter the camera looks on, in meters: with less, a ray meets the same triangle again; with more, it
-/// misses a surface on which the emitter lies. *Measured*: the references agree.
+/// How far behind an emitter the camera looks on, in meters: with less, a ray meets the same triangle again; with more,
+/// it misses a surface on which the emitter lies. *Measured*: the references agree.
 const BEHIND: f32 = 1e-5;
 
 /// Adds one sample to every pixel. Light touches at most `bounces` surfaces.
@@ -45,8 +45,8 @@ pub(crate) fn random_vertex(world: &World, bounces: u32, random: &mut Pcg32) -> 
     Some(vertex)
 }
 
-/// Returns what is seen through a random point of a pixel. Emitters do not show: the camera sees what is behind them, and
-/// `None` where that is the sky.
+/// Returns what is seen through a random point of a pixel. Emitters do not show: the camera sees what is behind them,
+/// and `None` where that is the sky.
 pub(crate) fn first_vertex(world: &World, corner: Vec2, random: &mut Pcg32) -> Option<Vertex> {
     let (mut origin, direction) = world.scene.camera.ray(corner + Vec2::from_array(random.uniform2()));
     loop {
@@ -98,8 +98,8 @@ fn radiance<L: Lighting>(world: &World, lighting: &L, mut vertex: Vertex, bounce
     sum
 }
 
-/// Returns what arrives from the place that a light technique proposes, is scattered along the path, and is not found by
-/// the surface's own sample.
+/// Returns what arrives from the place that a light technique proposes, is scattered along the path, and is not found
+/// by the surface's own sample.
 #[inline]
 fn proposed(world: &World, vertex: &Vertex, proposal: &Proposal) -> Vec3 {
     let scattered = vertex.scattered(proposal.direction);

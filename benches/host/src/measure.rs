@@ -93,8 +93,8 @@ impl Outcome {
     }
 }
 
-/// Renders one image with each method. The method that has had the least time has its turn next, so that a machine whose
-/// speed changes treats all alike.
+/// Renders one image with each method. The method that has had the least time has its turn next, so that a machine
+/// whose speed changes treats all alike.
 fn images(world: &World, methods: &[Method], bounces: u32, seed: u64, seconds: f64) -> Vec<Progress> {
     let start =
         |i: usize| Progress { film: Film::new(), random: Pcg32::new(seed, i as u64), seconds: methods[i].preparation };

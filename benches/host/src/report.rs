@@ -109,7 +109,8 @@ impl Report {
         Ok(())
     }
 
-    /// Prints one line a scene: fanlight against the best competitor, and the noise of the reference over fanlight's error.
+    /// Prints one line a scene: fanlight against the best competitor, and the noise of the reference over fanlight's
+    /// error.
     fn print_summary(&self) {
         println!("\n| scene | bounces | best competitor | fanlight over it | 95 % | call, rays | reference's noise |");
         println!("| --- | ---: | --- | ---: | ---: | ---: | ---: |");

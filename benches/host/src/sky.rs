@@ -59,8 +59,8 @@ impl Sky {
         self.rotation * vec3(cos * sine, -sin * sine, cosine)
     }
 
-    /// Returns the radiance along a unit direction, interpolated between the four nearest texel centers. Columns repeat,
-    /// rows end at the poles.
+    /// Returns the radiance along a unit direction, interpolated between the four nearest texel centers. Columns
+    /// repeat, rows end at the poles.
     #[inline]
     pub(crate) fn radiance(&self, direction: Vec3) -> Vec3 {
         let size = vec2(self.image.width as f32, self.image.height as f32);

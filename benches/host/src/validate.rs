@@ -11,8 +11,8 @@ use crate::methods::Method;
 use crate::random::Pcg32;
 use crate::world::World;
 
-/// Standard deviations by which a mean may differ from the reference's. *Measured*: of 40 means, none differs by more than 3
-/// by chance.
+/// Standard deviations by which a mean may differ from the reference's. *Measured*: of 40 means, none differs by more
+/// than 3 by chance.
 const DEVIATIONS: f64 = 4.0;
 
 /// Renders with each method for as long as an image takes, and compares means and errors. Returns whether they agree.

@@ -11,8 +11,8 @@ use crate::scenes::sky;
 
 /// Samples of the environment per axis of the equal-area map. Larger: exacter coefficients, slower to build.
 const RESOLUTION: usize = 256;
-/// Least share of a portal's irradiance under the mean radiance that the choice counts on: harmonics of a low degree may
-/// come to less than nothing.
+/// Least share of a portal's irradiance under the mean radiance that the choice counts on: harmonics of a low degree
+/// may come to less than nothing.
 const LEAST_SHARE: f64 = 0.05;
 
 /// The choice of a portal by its irradiance.

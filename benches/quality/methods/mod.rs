@@ -47,8 +47,8 @@ pub(crate) trait Method: Sync {
     /// Draws a direction.
     fn sample(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<Drawn>;
 
-    /// All that a host does at a point for one light sample: the density that its estimate is divided by. A method whose
-    /// samples come with that density needs no more than [`Self::sample`].
+    /// All that a host does at a point for one light sample: the density that its estimate is divided by. A method
+    /// whose samples come with that density needs no more than [`Self::sample`].
     fn call(&self, x: &ShadingPoint, u: [f32; 3]) -> Option<f64> {
         self.sample(x, u).map(|drawn| drawn.pdf)
     }
@@ -79,7 +79,8 @@ pub(crate) trait Method: Sync {
     }
 }
 
-/// Other arities of the tree over triangles than the default, and the least effort: run on any workload if they are named.
+/// Other arities of the tree over triangles than the default, and the least effort: run on any workload if they are
+/// named.
 pub(crate) const ON_REQUEST: [&str; 4] = ["fanlight-4", "fanlight-8", "fanlight-16", "fanlight-least"];
 
 /// Methods that are run on a workload, or a variant of it, by default.

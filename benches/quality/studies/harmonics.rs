@@ -1,8 +1,8 @@
 //! What a portal sends, by spherical harmonics (Wang and Ramamoorthi 2018): `-- --harmonics` prints a table.
 //!
-//! The window of the workload, with its smooth sky alone and with its sun. For each degree: how far the irradiance without
-//! noise is from the truth, and the variance of uniform directions through the window with the harmonics as a control
-//! variate, next to the crate's samples.
+//! The window of the workload, with its smooth sky alone and with its sun. For each degree: how far the irradiance
+//! without noise is from the truth, and the variance of uniform directions through the window with the harmonics as a
+//! control variate, next to the crate's samples.
 
 use std::time::Instant;
 

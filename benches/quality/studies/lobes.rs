@@ -1,8 +1,8 @@
-//! Glossy receivers: how much noise there is if lights are sampled with and without regard to the lobe, if the lobe alone is
-//! sampled, and if both are, weighted by the balance heuristic.
+//! Glossy receivers: how much noise there is if lights are sampled with and without regard to the lobe, if the lobe
+//! alone is sampled, and if both are, weighted by the balance heuristic.
 //!
-//! The receiver reflects `kd cos θ / π + ks D G / (4 cos θo)`, GGX with height-correlated masking and without Fresnel. Emitters
-//! do not cover each other: a ray sees all that it crosses.
+//! The receiver reflects `kd cos θ / π + ks D G / (4 cos θo)`, GGX with height-correlated masking and without Fresnel.
+//! Emitters do not cover each other: a ray sees all that it crosses.
 
 use core::f64::consts::{FRAC_1_PI, PI, TAU};
 
@@ -41,8 +41,8 @@ impl Lobe {
         0.5 * ((1.0 + self.alpha * self.alpha * tangent2).sqrt() - 1.0)
     }
 
-    /// Reflected share of the radiance from a direction above the surface, and the density of [`Self::sample`]; the part that
-    /// both have in common.
+    /// Reflected share of the radiance from a direction above the surface, and the density of [`Self::sample`]; the
+    /// part that both have in common.
     fn value_and_pdf(&self, direction: DVec3) -> (f64, f64) {
         let direction = self.frame.transpose() * direction;
         if direction.z <= 0.0 {

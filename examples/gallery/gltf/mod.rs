@@ -1,10 +1,10 @@
 //! Scene files: glTF 2.0, as `.gltf` or `.glb`.
 //!
-//! The table in docs/gallery/README.md says what is honored, what is noted and what is refused. Each file here reads one
-//! part of the format: [`container`] the file, [`data`] and [`accessor`] its bytes and arrays, [`hierarchy`] its nodes,
-//! [`primitive`] its meshes, [`surface`] its materials, [`lamps`] its lights; [`read`] puts them together. Whatever the
-//! bytes are, the outcome is a scene or an error of one line: nothing panics, calls itself as deep as the file says, or
-//! takes much more memory than the file has bytes.
+//! The table in docs/gallery/README.md says what is honored, what is noted and what is refused. Each file here reads
+//! one part of the format: [`container`] the file, [`data`] and [`accessor`] its bytes and arrays, [`hierarchy`] its
+//! nodes, [`primitive`] its meshes, [`surface`] its materials, [`lamps`] its lights; [`read`] puts them together.
+//! Whatever the bytes are, the outcome is a scene or an error of one line: nothing panics, calls itself as deep as the
+//! file says, or takes much more memory than the file has bytes.
 
 extern crate alloc;
 

@@ -40,7 +40,8 @@ const fn white() -> [f32; 3] {
     [1.0; 3]
 }
 
-/// The light that a node holds, and what a list says of it. Vertical angle 0 is along -z, and horizontal angle 0 along x.
+/// The light that a node holds, and what a list says of it. Vertical angle 0 is along -z, and horizontal angle 0 along
+/// x.
 pub(super) fn of_node(data: &Data<'_>, node: &Node, transform: &Mat4) -> Result<Option<(Lamp, String)>, Error> {
     let Some(Reference { light, multiplier, color }) = extension(&node.extensions, NAME)? else { return Ok(None) };
     let lights = data.document.extensions.get(NAME).and_then(|extension| extension.get("lights")?.as_array());

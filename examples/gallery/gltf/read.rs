@@ -48,8 +48,8 @@ impl<'a> From<&'a str> for Prefixes<'a> {
     }
 }
 
-/// Reads a scene from the bytes of a file, and from others in its folder, if there is one. Its environment is not in the
-/// file.
+/// Reads a scene from the bytes of a file, and from others in its folder, if there is one. Its environment is not in
+/// the file.
 pub(crate) fn read<'a>(
     bytes: &[u8],
     folder: Option<&Path>,

@@ -11,8 +11,8 @@ use super::alloc::sync::Arc;
 #[derive(Clone, Debug)]
 pub(crate) struct Lamp {
     pub(crate) kind: LampKind,
-    /// Radiant intensity, that of a spot on its axis, that of a luminaire where its diagram is 1; of a distant light, the
-    /// irradiance of what faces it.
+    /// Radiant intensity, that of a spot on its axis, that of a luminaire where its diagram is 1; of a distant light,
+    /// the irradiance of what faces it.
     pub(crate) strength: Vec3,
 }
 

@@ -178,8 +178,8 @@ impl Lights {
         LightsAt(self.sampler.at(&ShadingPoint::volume(position)))
     }
 
-    /// A distance along a stretch of a ray in fog of this density, by the light that is expected there, and its density per
-    /// length.
+    /// A distance along a stretch of a ray in fog of this density, by the light that is expected there, and its density
+    /// per length.
     pub(crate) fn propose_distance(
         &self,
         origin: Vec3,

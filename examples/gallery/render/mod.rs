@@ -1,9 +1,9 @@
 //! A small path tracer for triangle meshes.
 //!
-//! What it shares with [`lighting`], [`sources`] and [`weights`], the only files that call `fanlight` for it, is what any
-//! renderer has: a scene to cast rays into ([`scene`]), materials ([`material`], [`bsdf`]), lights without a surface
-//! ([`lamp`]), the radiance of the sky ([`world`]), and an integrator that asks for directions and for densities of
-//! directions ([`path`], and [`photon`] for light that is traced from its source).
+//! What it shares with [`lighting`], [`sources`] and [`weights`], the only files that call `fanlight` for it, is what
+//! any renderer has: a scene to cast rays into ([`scene`]), materials ([`material`], [`bsdf`]), lights without a
+//! surface ([`lamp`]), the radiance of the sky ([`world`]), and an integrator that asks for directions and for
+//! densities of directions ([`path`], and [`photon`] for light that is traced from its source).
 
 extern crate alloc;
 

@@ -1,8 +1,8 @@
 //! Light that is traced from where it starts: one ray for each path, and where it lands.
 //!
-//! A patch of floor in the sun lights the whole room, but a path comes upon it by chance only. A ray of light that comes
-//! in ends there nearly always: its end is one more vertex that the path can go on to (bidirectional path tracing,
-//! Veach and Guibas 1994, with one vertex from the light).
+//! A patch of floor in the sun lights the whole room, but a path comes upon it by chance only. A ray of light that
+//! comes in ends there nearly always: its end is one more vertex that the path can go on to (bidirectional path
+//! tracing, Veach and Guibas 1994, with one vertex from the light).
 
 use glam::Vec3;
 

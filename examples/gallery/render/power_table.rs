@@ -1,4 +1,5 @@
-//! Lights by their power, whatever they send to a shading point: what `fanlight` is compared with where there are lamps.
+//! Lights by their power, whatever they send to a shading point: what `fanlight` is compared with where there are
+//! lamps.
 
 use core::f32::consts::{PI, TAU};
 
@@ -60,7 +61,8 @@ impl PowerTable {
         direction.is_finite().then_some(Proposal { direction, pdf: share, aim: Aim::Lamp(lamp) })
     }
 
-    /// Density per solid angle of a direction that leads to a point of an emitter, or out of the scene if that is `None`.
+    /// Density per solid angle of a direction that leads to a point of an emitter, or out of the scene if that is
+    /// `None`.
     pub(crate) fn pdf(&self, direction: Vec3, point: Option<&Point>) -> f32 {
         match (self.share(0), point) {
             (share, Some(point)) if share > 0.0 => share * self.areas.pdf(direction, point),

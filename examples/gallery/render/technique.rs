@@ -49,8 +49,8 @@ impl Techniques {
         Ok(Self { environment: false, choice: LightChoice::None, ..Self::without(model)? })
     }
 
-    /// What a path tracer has that knows no portals: the sky's bright parts, emitters by area and radiance, and lamps by
-    /// power.
+    /// What a path tracer has that knows no portals: the sky's bright parts, emitters by area and radiance, and lamps
+    /// by power.
     pub(crate) fn without(model: &Model) -> Result<Self, Error> {
         let choice = if model.lamps.is_empty() {
             let table = TexelTable::areas(model);
@@ -62,17 +62,17 @@ impl Techniques {
         Ok(Self { lights, guide: None, choice, environment: true, vertices: u32::MAX, photons: false })
     }
 
-    /// The same path tracer with one sample of `fanlight` at each vertex in place of these: of all lights, and of the sky
-    /// through its portals or, where there are none, as one more light.
+    /// The same path tracer with one sample of `fanlight` at each vertex in place of these: of all lights, and of the
+    /// sky through its portals or, where there are none, as one more light.
     pub(crate) fn plain(model: &Model) -> Result<Self, Error> {
         let lights = Lights::plain(model)?;
         let choice = LightChoice::Plain;
         Ok(Self { lights, guide: None, choice, environment: false, vertices: u32::MAX, photons: false })
     }
 
-    /// All that this renderer has: at the point that the camera sees points on lights and the sky's bright parts, at those
-    /// behind it rays of light that are traced from where they start. Lamps are chosen at all points, as no ray is traced
-    /// from them.
+    /// All that this renderer has: at the point that the camera sees points on lights and the sky's bright parts, at
+    /// those behind it rays of light that are traced from where they start. Lamps are chosen at all points, as no ray
+    /// is traced from them.
     pub(crate) fn with_light_rays(model: &Model) -> Result<Self, Error> {
         let lights = Lights::new(model, Illumination::default())?;
         let guide = Guide::new(model)?;
@@ -119,8 +119,8 @@ impl Techniques {
         }
     }
 
-    /// A distance along a stretch of a ray in fog by the lights, and its density per length; `None` where only the fog itself
-    /// chooses.
+    /// A distance along a stretch of a ray in fog by the lights, and its density per length; `None` where only the fog
+    /// itself chooses.
     pub(crate) fn distance_in_fog(
         &self,
         origin: glam::Vec3,

@@ -94,7 +94,8 @@ fn add_lamps(model: &mut Model) {
     model.add(poles);
 }
 
-/// A diagram with a peak at 60 degrees to both sides, which sends little behind the pole. `across` is the side of the road.
+/// A diagram with a peak at 60 degrees to both sides, which sends little behind the pole. `across` is the side of the
+/// road.
 fn luminaire(across: f32) -> Diagram {
     let vertical: Vec<f32> = (0..=16_u16).map(|i| FRAC_PI_2 * f32::from(i) / 16.0).collect();
     let horizontal: Vec<f32> = (0..24_u16).map(|i| 2.0 * PI * f32::from(i) / 24.0).collect();

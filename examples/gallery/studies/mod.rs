@@ -23,8 +23,8 @@ pub(crate) fn study(scene: &Scene, model: &Model, effort: Effort) -> Result<Comp
     }
 }
 
-/// Renders a model without and with `fanlight` by the same plain path tracer, and by all that this renderer has, for each
-/// number of bounces. Returns the last comparison.
+/// Renders a model without and with `fanlight` by the same plain path tracer, and by all that this renderer has, for
+/// each number of bounces. Returns the last comparison.
 pub(crate) fn without_and_with(
     name: &str,
     model: &Model,

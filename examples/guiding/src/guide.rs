@@ -40,8 +40,8 @@ impl Guide {
         Self { regions: (0..6 * cells).map(|_| Region::default()).collect() }
     }
 
-    /// Fills the regions of some points, with their normals, with directions that `fanlight` draws there. No ray is traced: that walls hide
-    /// some of the lights is known to a view with a table.
+    /// Fills the regions of some points, with their normals, with directions that `fanlight` draws there. No ray is
+    /// traced: that walls hide some of the lights is known to a view with a table.
     pub(crate) fn fill(&mut self, lights: LightSamplerView<'_>, points: &[[Vec3; 2]], random: &mut Random) {
         for &[position, normal] in points {
             let here = lights.at(&ShadingPoint::surface(position, normal));

@@ -1,8 +1,8 @@
-//! A guided path tracer, of the kind of Müller, Gross and Novák (2017), that learns from nothing, from what `fanlight` knows
-//! of the lights, and from what it knows with a table of what walls hide.
+//! A guided path tracer, of the kind of Müller, Gross and Novák (2017), that learns from nothing, from what `fanlight`
+//! knows of the lights, and from what it knows with a table of what walls hide.
 //!
-//! `cargo run --release --manifest-path examples/guiding/Cargo.toml -- [FIGURE.svg]`. Nothing samples lights: paths find
-//! them by the directions that the guide draws, and all calls of `fanlight` are made before the first path.
+//! `cargo run --release --manifest-path examples/guiding/Cargo.toml -- [FIGURE.svg]`. Nothing samples lights: paths
+//! find them by the directions that the guide draws, and all calls of `fanlight` are made before the first path.
 
 mod figure;
 mod guide;

@@ -1,5 +1,5 @@
-//! A density of directions that follows weighted samples: a quadtree over the unit square, as in Müller, Gross and Novák
-//! (2017).
+//! A density of directions that follows weighted samples: a quadtree over the unit square, as in Müller, Gross and
+//! Novák (2017).
 
 use core::f32::consts::{PI, TAU};
 
@@ -7,7 +7,8 @@ use fanlight::glam::{Vec2, Vec3, vec2};
 
 /// A cell with more than this share of the weight is divided. *Chosen.*
 const SHARE: f32 = 0.02;
-/// The part of a cell's share that its quarters get alike, so that a few lucky samples do not starve the rest. *Chosen.*
+/// The part of a cell's share that its quarters get alike, so that a few lucky samples do not starve the rest.
+/// *Chosen.*
 const EVEN: f32 = 0.1;
 /// Cells are divided so often at most: down to a sixteenth of a degree. *Chosen.*
 const DEPTH: u32 = 10;

@@ -1,4 +1,5 @@
-//! Three rooms in a row. A door leads from the first to the second; the third is closed, and its lamps are the brightest.
+//! Three rooms in a row. A door leads from the first to the second; the third is closed, and its lamps are the
+//! brightest.
 
 use fanlight::glam::{Vec3, vec3};
 use fanlight::{Error, LightSampler, Mesh, Weight};

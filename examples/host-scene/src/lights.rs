@@ -1,8 +1,9 @@
 //! All that it takes to light `rust-pathtracer` through `fanlight`.
 //!
 //! The renderer chooses among spheres by itself and hands nothing over. But it asks the scene what a ray hits, and adds
-//! the material's emission: light that `fanlight` finds at a point is such an emission. The renderer's state still holds
-//! the vertex before, so that its own rays that hit a lamp are weighted with the density that `fanlight` had there.
+//! the material's emission: light that `fanlight` finds at a point is such an emission. The renderer's state still
+//! holds the vertex before, so that its own rays that hit a lamp are weighted with the density that `fanlight` had
+//! there.
 
 use fanlight::glam::Vec3;
 use fanlight::{Error, LightId, LightSampler, PointSampler, SampledLight, ShadingPoint, SphereLight};

@@ -1,8 +1,8 @@
 //! A renderer that knows no lights but spheres and lets nobody else choose them, lit by its own choice and through
 //! `fanlight`.
 //!
-//! `cargo run --release --manifest-path examples/host-scene/Cargo.toml -- [SAMPLES [PICTURE]]`. What had to be written is
-//! `lights.rs`, and what `scene.rs` does with it; the renderer is [`rust_pathtracer`] as it is on the registry.
+//! `cargo run --release --manifest-path examples/host-scene/Cargo.toml -- [SAMPLES [PICTURE]]`. What had to be written
+//! is `lights.rs`, and what `scene.rs` does with it; the renderer is [`rust_pathtracer`] as it is on the registry.
 
 mod lights;
 mod scene;

@@ -1,8 +1,8 @@
 //! Light that is traced into the room: one ray through a window for each path, and where it lands.
 //!
-//! A patch of floor in the sun lights the whole room, but a path comes upon it by chance only. A ray of light that comes
-//! in ends there nearly always: its end is one more vertex that the path can go on to (bidirectional path tracing,
-//! Veach and Guibas 1994, with one vertex from the light).
+//! A patch of floor in the sun lights the whole room, but a path comes upon it by chance only. A ray of light that
+//! comes in ends there nearly always: its end is one more vertex that the path can go on to (bidirectional path
+//! tracing, Veach and Guibas 1994, with one vertex from the light).
 
 use super::lighting::Incoming;
 use super::scene::SurfacePoint;

@@ -134,9 +134,10 @@ fn integrated<const CAPACITY: usize>(
 
 /// The mean over a footprint whose texels are in a window, by Green's theorem.
 ///
-/// With `F(x, y)` the integral of the image along the row `y`, from the window's left edge to `x`, the integral over the
-/// footprint is that of `F dy` along its edges. Between grid lines `F` is a polynomial of at most third degree along an
-/// edge, so that two points of Gauss's rule integrate it exactly; with nearest lookup it is linear, and its middle does.
+/// With `F(x, y)` the integral of the image along the row `y`, from the window's left edge to `x`, the integral over
+/// the footprint is that of `F dy` along its edges. Between grid lines `F` is a polynomial of at most third degree
+/// along an edge, so that two points of Gauss's rule integrate it exactly; with nearest lookup it is linear, and its
+/// middle does.
 ///
 /// Texels above `brightest` are not touched. They count as that, so that what they add and subtract again is not larger
 /// than the result.

@@ -146,8 +146,8 @@ pub(crate) struct EdgeNormal {
 }
 
 impl TexelFootprint {
-    /// Whether the closed triangle, of which these are the normals, meets a closed box. Works for triangles without area,
-    /// too.
+    /// Whether the closed triangle, of which these are the normals, meets a closed box. Works for triangles without
+    /// area, too.
     pub(crate) fn meets(&self, normals: &[EdgeNormal; 3], x: [f64; 2], y: [f64; 2]) -> bool {
         if self.lo[0] > x[1] || self.hi[0] < x[0] || self.lo[1] > y[1] || self.hi[1] < y[0] {
             return false;

@@ -15,10 +15,11 @@ const WORTHWHILE_CELLS: usize = 256;
 
 /// Relative variance of sampling inside a cell from which dividing it is worth memory beyond the usual.
 ///
-/// Chosen between two cases, not swept: the cells of grid-10000's clip map of 400² texels have 3, and those of noise have
-/// less than 1.
+/// Chosen between two cases, not swept: the cells of grid-10000's clip map of 400² texels have 3, and those of noise
+/// have less than 1.
 ///
-/// Larger: sharp edges stay inside of cells, and samples miss the openings. Smaller: noise takes twice the memory for little.
+/// Larger: sharp edges stay inside of cells, and samples miss the openings. Smaller: noise takes twice the memory for
+/// little.
 const WORTHWHILE_VARIANCE: f64 = 1.5;
 
 /// The weights over a triangle.

@@ -34,8 +34,8 @@ const FINE_LENGTH: f64 = 1.5;
 /// How often a fine cell may be halved where its contrast is worth it: along sharp edges between texels, and where
 /// bilinear lookup blurs them. A level halves a cell three times, so that these are two levels and one.
 ///
-/// *Measured* (the same table) with levels of one halving. More makes cells along edges smaller and takes memory: with half
-/// of each a clip map had three times the variance, with twice the blurred one it took seven times the memory.
+/// *Measured* (the same table) with levels of one halving. More makes cells along edges smaller and takes memory: with
+/// half of each a clip map had three times the variance, with twice the blurred one it took seven times the memory.
 const EXTRA_HALVINGS: [u32; 2] = [6, 2];
 
 /// What the contrast of fine cells that are not divided may add to the relative variance.
@@ -61,11 +61,12 @@ const TEXELS_OF_COPIES: f64 = (1 << 15) as f64;
 /// Bytes for one triangle, at most. A budget: it bounds what one large image can take.
 const IMAGE_TREE_BYTES: f64 = (1 << 22) as f64;
 
-/// How many shares of [`BYTES_PER_IMAGE`] a triangle may take at most, if triangles of earlier batches have saved theirs:
-/// where an image is detailed in a few places, most triangles take next to nothing.
+/// How many shares of [`BYTES_PER_IMAGE`] a triangle may take at most, if triangles of earlier batches have saved
+/// theirs: where an image is detailed in a few places, most triangles take next to nothing.
 ///
-/// A budget, chosen and not swept: with one share the variance of sphere-9-spots was 1.8 times as large. Larger: the first
-/// triangles with detail may take what later ones need. Smaller: detail is left inside of cells while memory is unused.
+/// A budget, chosen and not swept: with one share the variance of sphere-9-spots was 1.8 times as large. Larger: the
+/// first triangles with detail may take what later ones need. Smaller: detail is left inside of cells while memory is
+/// unused.
 const MOST_SHARES: f64 = 4.0;
 
 /// A triangle that covers fewer texels has no tree. One that covers as many may have a node, whatever it takes.
@@ -126,15 +127,16 @@ fn units(texture: &Texture<'_>, uv: [Vec2; 3]) -> usize {
 /// Adds the BLAS of many triangles to the pool. `trees` are sorted by their textures. Returns their roots in the same
 /// order.
 ///
-/// A cell is divided until lookups in it are all the same, or until, to the nearest level, it has at most one texel's area
-/// and edges of at most 1.5 texels; beyond that, by up to two levels (one with bilinear lookup), where an edge of the image
-/// runs through.
-/// A triangle whose memory runs out divides the cells first that reduce the variance most; the others keep their
-/// average. There are two bytes for each texel that it can see (four where most samples would go astray), half a byte
-/// (for 2^15 texels at least) where it sees copies of them, more for images of fewer than 2^17 texels, and 4 MB in all
-/// (8 MB). If that leaves fewer than four leaves for each copy of the image, the triangle is not divided.
+/// A cell is divided until lookups in it are all the same, or until, to the nearest level, it has at most one texel's
+/// area and edges of at most 1.5 texels; beyond that, by up to two levels (one with bilinear lookup), where an edge of
+/// the image runs through. A triangle whose memory runs out divides the cells first that reduce the variance most; the
+/// others keep their average. There are two bytes for each texel that it can see (four where most samples would go
+/// astray), half a byte (for 2^15 texels at least) where it sees copies of them, more for images of fewer than 2^17
+/// texels, and 4 MB in all (8 MB). If that leaves fewer than four leaves for each copy of the image, the triangle is
+/// not divided.
 ///
-/// What the triangles of a small image share is given out in their order, so that the number of threads changes nothing.
+/// What the triangles of a small image share is given out in their order, so that the number of threads changes
+/// nothing.
 ///
 /// # Errors
 ///
@@ -194,8 +196,8 @@ struct ImageGroup<'a> {
 }
 
 impl<'a> ImageGroup<'a> {
-    /// Leaves what the trees of a batch have saved to the next ones. Within a batch memory only shrinks, so that most trees
-    /// need not be grown again.
+    /// Leaves what the trees of a batch have saved to the next ones. Within a batch memory only shrinks, so that most
+    /// trees need not be grown again.
     fn end_batch(&mut self) {
         for ImageMemory { saved, saved_now, .. } in self.pyramids.iter_mut().map(|pyramid| &mut pyramid.memory) {
             *saved += core::mem::take(saved_now);
@@ -351,7 +353,8 @@ impl WeightSource for ImageOnTriangle<'_> {
     }
 }
 
-/// How many levels it takes until cells are fine, to the nearest: what a level more would divide is left to the contrast.
+/// How many levels it takes until cells are fine, to the nearest: what a level more would divide is left to the
+/// contrast.
 fn levels(uv_triangle: &UvTriangle) -> u32 {
     let (double_area, longest) = uv_triangle.extent();
     let (mut halvings, mut scale) = (0, 1.0);

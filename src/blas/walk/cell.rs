@@ -6,8 +6,9 @@ use crate::blas::barycentric::{ARITY, CellPosition, EDGE_CELLS, POSITIONS};
 
 /// Centers, sizes and orientations of the children of a cell, as arrays for loops over all of them.
 ///
-/// A linear function with the values `f0`, `f1` and `f2` at the corners of the cell, and `f` at its center, has the value
-/// `g = f0 + b1 (f1 - f0) + b2 (f2 - f0)` at the center of a child, and `g + scale (fk - f)` at the child's corner `k`.
+/// A linear function with the values `f0`, `f1` and `f2` at the corners of the cell, and `f` at its center, has the
+/// value `g = f0 + b1 (f1 - f0) + b2 (f2 - f0)` at the center of a child, and `g + scale (fk - f)` at the child's
+/// corner `k`.
 pub(crate) struct ChildCenters {
     /// Barycentrics of the centroids.
     pub(crate) b1: [f32; ARITY],

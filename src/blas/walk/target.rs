@@ -15,8 +15,9 @@ pub(crate) trait CellTarget {
     /// One of the children of a cell.
     fn child(&self, cell: &Self::Cell, index: usize) -> Self::Cell;
 
-    /// Weighs the children of a cell, relative to each other, as if their texture were one: writes the weights. One is zero
-    /// only if nothing can arrive from the child; it may be infinite. Where an average is zero, any weight will do.
+    /// Weighs the children of a cell, relative to each other, as if their texture were one: writes the weights. One is
+    /// zero only if nothing can arrive from the child; it may be infinite. Where an average is zero, any weight will
+    /// do.
     ///
     /// Arrays are written rather than returned because what is returned may be copied.
     fn weigh_children(&self, at: LatticeCell, cell: &Self::Cell, averages: &[f32; ARITY], weights: &mut [f32; ARITY]);

@@ -22,7 +22,8 @@ use crate::tlas::{Arity, LeafStore, MAX_LEAVES, Tlas, TreeEdit};
 /// Fewest spare places that are added for triangles or instances. *Chosen*: a few kilobytes.
 const LEAST_SPARE: usize = 64;
 
-/// Nodes of trees over textures that are never worth a search for those that nothing refers to. *Chosen*: 300 kilobytes.
+/// Nodes of trees over textures that are never worth a search for those that nothing refers to. *Chosen*: 300
+/// kilobytes.
 const FEW_CELLS: usize = 4096;
 
 /// The parts of a sampler that edits change.
@@ -57,8 +58,8 @@ impl EditState {
     ///
     /// # Errors
     ///
-    /// If there are more lights or more nodes over textures than can be numbered, or a factor times the weight of a mesh that
-    /// was added is too large.
+    /// If there are more lights or more nodes over textures than can be numbered, or a factor times the weight of a
+    /// mesh that was added is too large.
     pub(crate) fn apply(&mut self, changes: LightChanges<'_>, edited: Edited<'_>) -> Result<Applied, Error> {
         let LightChanges { mut collection, lamps, meshes, instances, .. } = changes;
         let Edited { lights, tlas, environment, arity } = edited;

@@ -59,7 +59,8 @@ pub(super) struct InstanceChange {
     pub(super) groups: Option<u32>,
 }
 
-/// Returns the logarithm of the places of a mesh, by which a removed one is found; rounded up for one that looks for places.
+/// Returns the logarithm of the places of a mesh, by which a removed one is found; rounded up for one that looks for
+/// places.
 pub(super) fn class_of(places: u32) -> u32 {
     places.checked_ilog2().unwrap_or(u32::MAX)
 }

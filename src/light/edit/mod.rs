@@ -1,12 +1,12 @@
 //! Lights that come, go and change in a finished sampler.
 //!
-//! A batch of edits is first checked and collected ([`LightChanges`]), by the number of what it edits, so that the last word on
-//! each counts. Then it is applied ([`apply`]), and nothing of that can fail. What a sampler needs for this and no walk looks at
-//! is kept beside it ([`LightsState`]).
+//! A batch of edits is first checked and collected ([`LightChanges`]), by the number of what it edits, so that the last
+//! word on each counts. Then it is applied ([`apply`]), and nothing of that can fail. What a sampler needs for this and
+//! no walk looks at is kept beside it ([`LightsState`]).
 //!
-//! Numbers of what was removed are given out again, to later batches. Meshes have places for their triangles in one array:
-//! the places of a removed mesh go to one that needs at least half of them. The array ends with spare places, which are those of
-//! one more mesh that nobody knows of, so that a new mesh need not move the lamps behind all meshes.
+//! Numbers of what was removed are given out again, to later batches. Meshes have places for their triangles in one
+//! array: the places of a removed mesh go to one that needs at least half of them. The array ends with spare places,
+//! which are those of one more mesh that nobody knows of, so that a new mesh need not move the lamps behind all meshes.
 
 mod apply;
 mod changes;
@@ -30,10 +30,11 @@ pub(crate) use changes::LightChanges;
 pub(crate) use layout::laid_out;
 use numbers::Numbers;
 
-/// Most light that all lights may come to send, relative to what they sent when the tree was fitted last, and the inverse of
-/// the least. Beyond it all nodes are fitted again. *Chosen*: far from what single precision holds.
+/// Most light that all lights may come to send, relative to what they sent when the tree was fitted last, and the
+/// inverse of the least. Beyond it all nodes are fitted again. *Chosen*: far from what single precision holds.
 ///
-/// Larger: products come nearer to overflow. Smaller: more edits of very bright or nearly all lights take the time of a refit.
+/// Larger: products come nearer to overflow. Smaller: more edits of very bright or nearly all lights take the time of a
+/// refit.
 const UNIT_DRIFT: f64 = 1_048_576.0;
 
 /// What edits of a sampler need to know beside it.

@@ -1,8 +1,9 @@
 //! Bounds and moments of an instance in the world, by those of its object.
 //!
-//! What is a proof stays one: the box holds the mapped box, and the cone of normals is widened where the map bends it. What
-//! is an estimate is exact where it can be: mean position and variance for any map, and the mean normal and the energy
-//! as far as each triangle's energy is multiplied by the factor of all. The factor of a triangle of the unit normal n is
+//! What is a proof stays one: the box holds the mapped box, and the cone of normals is widened where the map bends it.
+//! What is an estimate is exact where it can be: mean position and variance for any map, and the mean normal and the
+//! energy as far as each triangle's energy is multiplied by the factor of all. The factor of a triangle of the unit
+//! normal n is
 //! |det M · M⁻ᵀn|, and that of all is the root of its mean square.
 
 use glam::{DMat3, DVec3, Vec3};
@@ -14,21 +15,21 @@ use crate::geometry::{Aabb, Cone, Placement, between, norm};
 use crate::math;
 use core::f32::consts::{FRAC_PI_2, PI};
 
-/// Widening of a box for rounding to single precision, relative to its largest coordinate. *Proved*: half a unit in the last
-/// place is 6e-8. Larger: boxes far from the origin are wider than need be.
+/// Widening of a box for rounding to single precision, relative to its largest coordinate. *Proved*: half a unit in the
+/// last place is 6e-8. Larger: boxes far from the origin are wider than need be.
 const BOX_ROUNDING: f64 = 1.2e-7;
 
-/// Widening of a cone of normals, in radians, for what a map that counts as a similarity bends. *Proved*: axes that are within
-/// 1e-4 of orthonormal change angles by at most twice that. Larger: a little less is culled.
+/// Widening of a cone of normals, in radians, for what a map that counts as a similarity bends. *Proved*: axes that are
+/// within 1e-4 of orthonormal change angles by at most twice that. Larger: a little less is culled.
 const SIMILARITY_MARGIN: f32 = 2e-4;
 
-/// Widening of a cone of normals, in radians, for rounding. *Proved*: the arcsine and its argument are off by about 1e-7 each,
-/// but next to a right angle, where the cone is as good as a half-space. Larger: a little less is culled.
+/// Widening of a cone of normals, in radians, for rounding. *Proved*: the arcsine and its argument are off by about
+/// 1e-7 each, but next to a right angle, where the cone is as good as a half-space. Larger: a little less is culled.
 const CONE_ROUNDING: f32 = 1e-6;
 
 impl PlacedObject<'_> {
-    /// Returns the factor that areas are multiplied by, as the root of its mean square by energy; exact for a similarity and
-    /// for an object in one plane.
+    /// Returns the factor that areas are multiplied by, as the root of its mean square by energy; exact for a
+    /// similarity and for an object in one plane.
     pub(super) fn area_scale(&self, placement: &Placement) -> f64 {
         let areas = placement.areas();
         root_of(trace(&(areas * symmetric(self.object.header.normals) * areas.transpose())))
@@ -104,8 +105,8 @@ fn trace(matrix: &DMat3) -> f64 {
 
 /// Returns a cone that holds what a map makes of a cone of normals.
 ///
-/// A vector `a + τ`, with τ across the axis a and no longer than `tan θ`, is mapped to within `asin(‖C‖ tan θ / |C a|)` of the
-/// image of the axis, where C maps normals.
+/// A vector `a + τ`, with τ across the axis a and no longer than `tan θ`, is mapped to within `asin(‖C‖ tan θ / |C a|)`
+/// of the image of the axis, where C maps normals.
 fn mapped_cone(placement: &Placement, axis: Vec3, theta: f32) -> Cone {
     let areas = placement.areas();
     if theta > 0.0 && placement.is_similarity() {

@@ -153,8 +153,8 @@ impl<'a> LightCollection<'a> {
 }
 
 impl LightTriangle {
-    /// Returns the record that stands for an instance in the order of the tree's leaves. *Format*: it is marked as a lamp and a
-    /// portal, which no lamp is, and a moving triangle with one more mark.
+    /// Returns the record that stands for an instance in the order of the tree's leaves. *Format*: it is marked as a
+    /// lamp and a portal, which no lamp is, and a moving triangle with one more mark.
     pub(in crate::light) fn of_instance(number: u32) -> Self {
         let mark = Self::LAMP | Self::PORTAL;
         Self { index_and_flags: number | mark, ..bytemuck::Zeroable::zeroed() }

@@ -17,11 +17,11 @@ impl PlacedObject<'_> {
         self.object.tree().cross_within(origin, direction, margin, visit);
     }
 
-    /// Visits every triangle, by its leaf, whose box may hold a point in a cone around a unit vector, with an angular radius of
-    /// this sine and cosine.
+    /// Visits every triangle, by its leaf, whose box may hold a point in a cone around a unit vector, with an angular
+    /// radius of this sine and cosine.
     ///
-    /// The map makes an elliptic cone of it. A direction `a + τ`, with τ across the axis a and no longer than `tan r`, is mapped
-    /// to within `asin(‖M⁻¹‖ tan r / |M⁻¹ a|)` of the image of the axis.
+    /// The map makes an elliptic cone of it. A direction `a + τ`, with τ across the axis a and no longer than `tan r`,
+    /// is mapped to within `asin(‖M⁻¹‖ tan r / |M⁻¹ a|)` of the image of the axis.
     pub(crate) fn meet(&self, origin: Vec3, axis: Vec3, [sin, cos]: [f32; 2], visit: impl FnMut(u32)) {
         let placement = self.placement();
         let (origin, margin) = ray_origin(&placement, origin);
@@ -47,8 +47,8 @@ impl PlacedObject<'_> {
         self.object.tree().pmf_outgoing(below, &self.own_outgoing(outgoing))
     }
 
-    /// Returns which light leaves, in the object's space. The area that a triangle turns towards a beam is in proportion to that
-    /// which it turns there towards the beam's image, for all triangles alike.
+    /// Returns which light leaves, in the object's space. The area that a triangle turns towards a beam is in
+    /// proportion to that which it turns there towards the beam's image, for all triangles alike.
     fn own_outgoing(&self, outgoing: &Outgoing) -> Outgoing {
         match outgoing {
             Outgoing::Diffuse => Outgoing::Diffuse,

@@ -1,4 +1,5 @@
-//! Ways from ids to the triangles of instances and back, and what is asked of a light whether it belongs to an instance or not.
+//! Ways from ids to the triangles of instances and back, and what is asked of a light whether it belongs to an instance
+//! or not.
 
 use glam::Vec3;
 
@@ -8,8 +9,8 @@ use crate::receiver::ShadingPoint;
 use crate::record::{InstanceId, TriangleId};
 
 impl PlacedObject<'_> {
-    /// Returns all triangles in their places, rounded to single precision, with their fronts as the order of their vertices
-    /// says. What else they hold counts for nothing.
+    /// Returns all triangles in their places, rounded to single precision, with their fronts as the order of their
+    /// vertices says. What else they hold counts for nothing.
     pub(in crate::light) fn flattened(&self) -> impl Iterator<Item = LightTriangle> {
         let is_mirrored = self.placement().is_mirrored();
         (0..self.object.len() as u32).map(move |below| {

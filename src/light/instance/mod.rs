@@ -1,10 +1,11 @@
 //! Instances: objects that are built once and placed any number of times.
 //!
 //! An *object* is meshes with a light tree of their own ([`Object`]), an *instance* is an affine map and a factor
-//! ([`InstanceRecord`]), and in the tree over all lights an instance is a leaf ([`PlacedObject`]). Its bounds there are those
-//! of the object, mapped ([`bounds`]). Where a walk ends in such a leaf, it goes on in the object's own tree, for the shading
-//! point in the object's own space ([`ObjectWalk`]), and ends in a triangle. That triangle is mapped to the world
-//! ([`PlacedTriangle`]), and from there on it is a triangle like any other: trees over textures do not know its shape.
+//! ([`InstanceRecord`]), and in the tree over all lights an instance is a leaf ([`PlacedObject`]). Its bounds there are
+//! those of the object, mapped ([`bounds`]). Where a walk ends in such a leaf, it goes on in the object's own tree, for
+//! the shading point in the object's own space ([`ObjectWalk`]), and ends in a triangle. That triangle is mapped to the
+//! world ([`PlacedTriangle`]), and from there on it is a triangle like any other: trees over textures do not know its
+//! shape.
 
 mod bounds;
 mod collect;
@@ -39,22 +40,22 @@ pub(crate) use walk::ObjectWalk;
 /// Largest ratio of the longest to the shortest image of a unit vector. *Chosen*: shading points are rounded to single
 /// precision in the object's space.
 ///
-/// Larger: flat images of objects are accepted whose triangles, seen from the side, are chosen by rounding. Smaller: what can be
-/// sampled is refused.
+/// Larger: flat images of objects are accepted whose triangles, seen from the side, are chosen by rounding. Smaller:
+/// what can be sampled is refused.
 const LARGEST_CONDITION: f64 = 1e6;
 
-/// Largest factor by which a map may lengthen or shorten. *Proved*: determinants and their squares are normal numbers in single
-/// precision.
+/// Largest factor by which a map may lengthen or shorten. *Proved*: determinants and their squares are normal numbers
+/// in single precision.
 ///
 /// Larger: weights could overflow. Smaller: objects modeled in tiny or huge units are refused.
 const LARGEST_SCALE: f64 = 1e12;
 
 /// An object at a place: see [`add_instance`](crate::LightSamplerBuilder::add_instance).
 ///
-/// The transform maps the object's space to the world. It may be any affine map that can be inverted: rotation, uniform and
-/// non-uniform scale, mirror image, shear. The front of a triangle stays its front, in a mirror image as well. Weights are not
-/// affected by the transform: radiance stays radiance, and an object that is scaled to twice its size sends four times the
-/// power.
+/// The transform maps the object's space to the world. It may be any affine map that can be inverted: rotation, uniform
+/// and non-uniform scale, mirror image, shear. The front of a triangle stays its front, in a mirror image as well.
+/// Weights are not affected by the transform: radiance stays radiance, and an object that is scaled to twice its size
+/// sends four times the power.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub struct Instance {
@@ -72,15 +73,16 @@ impl Instance {
         Self { object, transform, scale: 1.0, groups: ALL_GROUPS, end: None }
     }
 
-    /// Multiplies the weights of the object's meshes, 1 until this sets it: finite, not negative. 0 switches the instance off.
+    /// Multiplies the weights of the object's meshes, 1 until this sets it: finite, not negative. 0 switches the
+    /// instance off.
     pub const fn scaled(mut self, factor: f32) -> Self {
         self.scale = factor;
         self
     }
 
     /// Puts the instance in light groups, a set of bits: it is sampled for shading points that receive one of them
-    /// ([`ShadingPoint::with_groups`]). All bits until this sets it. Meshes of an object have no groups of their own, and a change
-    /// by [`refit_instances`](crate::LightSampler::refit_instances) does not look at them.
+    /// ([`ShadingPoint::with_groups`]). All bits until this sets it. Meshes of an object have no groups of their own,
+    /// and a change by [`refit_instances`](crate::LightSampler::refit_instances) does not look at them.
     pub const fn groups(mut self, groups: u32) -> Self {
         self.groups = groups;
         self
@@ -106,13 +108,13 @@ pub(crate) struct InstanceRecord {
 const _: () = assert!(size_of::<InstanceRecord>() == 64);
 
 impl InstanceRecord {
-    /// Returns the record of an instance that may be added as one with this number. `low` and `high` are the corners of the
-    /// object's box, `object` its first word.
+    /// Returns the record of an instance that may be added as one with this number. `low` and `high` are the corners of
+    /// the object's box, `object` its first word.
     ///
     /// # Errors
     ///
-    /// If the map is not finite or not invertible, at the start of the interval or later, moves a corner too far away, or the
-    /// factor is out of its range.
+    /// If the map is not finite or not invertible, at the start of the interval or later, moves a corner too far away,
+    /// or the factor is out of its range.
     pub(super) fn new(instance: &Instance, number: usize, object: u32, [low, high]: [Vec3; 2]) -> Result<Self, Error> {
         let columns = instance.transform.to_cols_array_2d();
         let record = Self { columns, object, scale: instance.scale, leaf: super::NO_LEAF, number: instance.object.0 };
@@ -179,8 +181,8 @@ pub(super) fn first_object(instances: usize) -> usize {
     1 + instances * RECORD_WORDS
 }
 
-/// Returns the records of all instances. *Format*: the words are the number of instances, their records, and the objects one
-/// after the other.
+/// Returns the records of all instances. *Format*: the words are the number of instances, their records, and the
+/// objects one after the other.
 #[inline]
 pub(super) fn records(words: &[u32]) -> &[InstanceRecord] {
     let Some((&count, rest)) = words.split_first() else { return &[] };
@@ -195,8 +197,8 @@ pub(super) fn records_mut(words: &mut [u32]) -> &mut [InstanceRecord] {
     bytemuck::try_cast_slice_mut(words).unwrap_or(&mut [])
 }
 
-/// Returns the words of instances and objects, in which the records number the words from the first object; none without
-/// instances.
+/// Returns the words of instances and objects, in which the records number the words from the first object; none
+/// without instances.
 pub(super) fn join(instances: &[InstanceRecord], objects: &[u32]) -> Vec<u32> {
     if instances.is_empty() {
         return Vec::new();
@@ -238,16 +240,16 @@ impl<'a> PlacedObject<'a> {
         self.object.header.lights
     }
 
-    /// Returns the irradiance by its estimate in units of the object's own energy ([`ObjectWalk::irradiance`]), for portals
-    /// that show this mean radiance. Zero only if the estimate is, or the instance is switched off.
+    /// Returns the irradiance by its estimate in units of the object's own energy ([`ObjectWalk::irradiance`]), for
+    /// portals that show this mean radiance. Zero only if the estimate is, or the instance is switched off.
     pub(crate) fn irradiance(&self, estimate: f32, mean: f64) -> f32 {
         let header = self.object.header;
         let energy = f64::from(header.flux) + mean * f64::from(header.portal);
         storable(energy * f64::from(self.record.scale) * f64::from(estimate))
     }
 
-    /// Returns the shares of the object's energy that do not depend on the direction and that come through portals, which show
-    /// this mean radiance. Both are zero while the instance is switched off.
+    /// Returns the shares of the object's energy that do not depend on the direction and that come through portals,
+    /// which show this mean radiance. Both are zero while the instance is switched off.
     pub(crate) fn shares(&self, mean: f32) -> [f32; 2] {
         let header = self.object.header;
         let (flux, portal) = (f64::from(header.flux), f64::from(mean) * f64::from(header.portal));
@@ -261,8 +263,8 @@ impl<'a> PlacedObject<'a> {
     }
 }
 
-/// As a leaf an instance is a cluster of lights: what is asked here is answered by its bounds or by the weights of its own
-/// tree, and its triangles are asked one by one.
+/// As a leaf an instance is a cluster of lights: what is asked here is answered by its bounds or by the weights of its
+/// own tree, and its triangles are asked one by one.
 impl LightKind for PlacedObject<'_> {
     fn is_portal(&self) -> bool {
         self.object.has_portals()

@@ -1,7 +1,7 @@
 //! Instances whose transforms move while the shutter is open.
 //!
-//! The elements of the transform are interpolated, so that every point of the object moves along a straight line. Bounds are
-//! those over the whole interval, by the Bernstein coefficients of what changes with a power of the time
+//! The elements of the transform are interpolated, so that every point of the object moves along a straight line.
+//! Bounds are those over the whole interval, by the Bernstein coefficients of what changes with a power of the time
 //! ([`geometry`](crate::geometry)), in parts of the interval.
 
 use glam::{Affine3A, DMat3, DVec3, Vec3};
@@ -12,21 +12,23 @@ use crate::geometry::{Cone, Placement, cofactors, determinants, norm};
 use crate::light::Extras;
 use crate::light::motion::{EndColumns, PARTS, convex_cone, simpson, widened};
 
-/// Most times that the interval is halved to prove that a transform can be inverted. *Chosen*: bounds over a thousandth of the
-/// interval are those of a moment.
+/// Most times that the interval is halved to prove that a transform can be inverted. *Chosen*: bounds over a thousandth
+/// of the interval are those of a moment.
 ///
-/// Larger: what is refused takes longer to be refused. Smaller: transforms of a condition close to the limit are refused.
+/// Larger: what is refused takes longer to be refused. Smaller: transforms of a condition close to the limit are
+/// refused.
 const MOST_HALVINGS: u32 = 10;
 
 impl Instance {
-    /// Makes the instance move while the shutter is open: from its transform at the start, the time 0, to this one at the end, the
-    /// time 1. Samples and densities are those of the time of the shading point
+    /// Makes the instance move while the shutter is open: from its transform at the start, the time 0, to this one at
+    /// the end, the time 1. Samples and densities are those of the time of the shading point
     /// ([`ShadingPoint::at_time`](crate::ShadingPoint::at_time)), and exact at each.
     ///
-    /// In between, every *element* of the transform is interpolated linearly, so that points move along straight lines: a
-    /// renderer must do the same, or divide the interval until it makes no difference. An object that turns by an angle α is
-    /// smaller by the factor cos(α/2) in the middle: 0.4 % for 10 degrees, 3.4 % for 30. The transform must be one that can be
-    /// inverted at all times, so that an object cannot turn by 180 degrees, or into its mirror image.
+    /// In between, every *element* of the transform is interpolated linearly, so that points move along straight lines:
+    /// a renderer must do the same, or divide the interval until it makes no difference. An object that turns by an
+    /// angle α is smaller by the factor cos(α/2) in the middle: 0.4 % for 10 degrees, 3.4 % for 30. The transform must
+    /// be one that can be inverted at all times, so that an object cannot turn by 180 degrees, or into its mirror
+    /// image.
     pub const fn moving_to(mut self, end: Affine3A) -> Self {
         self.end = Some(end);
         self
@@ -52,8 +54,8 @@ impl InstanceRecord {
     }
 }
 
-/// Checks that a matrix that moves evenly can be inverted at all times of an interval, at whose ends it can. The error is a time
-/// at which it cannot.
+/// Checks that a matrix that moves evenly can be inverted at all times of an interval, at whose ends it can. The error
+/// is a time at which it cannot.
 fn check_between(at: &impl Fn(f64) -> DMat3, [start, end]: [f64; 2], halvings: u32) -> Result<(), f64> {
     let (first, last) = (at(start), at(end));
     let sign = determinant_of(&first).signum();
@@ -77,8 +79,8 @@ fn check_between(at: &impl Fn(f64) -> DMat3, [start, end]: [f64; 2], halvings: u
     check_between(at, [middle, end], halvings - 1)
 }
 
-/// Whether a matrix can be inverted well enough, by bounds on the lengths of what it and its cofactors make of unit vectors,
-/// and on the determinant.
+/// Whether a matrix can be inverted well enough, by bounds on the lengths of what it and its cofactors make of unit
+/// vectors, and on the determinant.
 fn is_invertible(largest: f64, cofactor: f64, determinant: f64) -> bool {
     let inverse = cofactor / determinant;
     // NaN fails.
@@ -144,14 +146,17 @@ impl<'a> PlacedObject<'a> {
         (areas(0.0) + areas(0.5) * 4.0 + areas(1.0)) * (1.0 / 6.0)
     }
 
-    /// Returns the maps to the world at both ends of the interval, which are the same for an instance that stands still.
+    /// Returns the maps to the world at both ends of the interval, which are the same for an instance that stands
+    /// still.
     pub(super) fn ends(&self) -> [Placement; 2] {
         [&self.record.columns, self.end.unwrap_or(&self.record.columns)].map(Placement::new)
     }
 
-    /// Returns a cone that holds what the maps of all times make of a cone of normals; `None` for an instance that stands still.
+    /// Returns a cone that holds what the maps of all times make of a cone of normals; `None` for an instance that
+    /// stands still.
     ///
-    /// In each part of the interval, what is made of a normal lies between what the coefficients of the cofactors make of it.
+    /// In each part of the interval, what is made of a normal lies between what the coefficients of the cofactors make
+    /// of it.
     pub(super) fn moving_cone(&self, axis: Vec3, theta: f32) -> Option<Cone> {
         let end = self.end?;
         let linear = |i: usize| self.placement_at(end, i as f64 / PARTS as f64).linear;

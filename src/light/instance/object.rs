@@ -1,4 +1,5 @@
-//! An object as words: what is known of it as a whole, its light tree, its triangles, and the ways from ids to triangles.
+//! An object as words: what is known of it as a whole, its light tree, its triangles, and the ways from ids to
+//! triangles.
 //!
 //! All objects of a scene are in one array, one after the other, so that a sampler is no larger for it.
 
@@ -163,7 +164,8 @@ impl<'a> Object<'a> {
         [self.header.low, self.header.high].map(Vec3::from)
     }
 
-    /// Returns the leaf of a triangle in the object's own tree; `None` for one that emits nothing or that was never added.
+    /// Returns the leaf of a triangle in the object's own tree; `None` for one that emits nothing or that was never
+    /// added.
     pub(crate) fn leaf(&self, id: TriangleId) -> Option<u32> {
         let Parts { meshes, leaf_of, .. } = self.parts();
         let mesh = id.mesh.0 as usize;
@@ -272,7 +274,8 @@ pub(super) fn root_of(square: f64) -> f64 {
     sqrt64(square.max(0.0))
 }
 
-/// Returns the first word of every object, after those of all instances: of `words`, or of `alone` where there is no instance.
+/// Returns the first word of every object, after those of all instances: of `words`, or of `alone` where there is no
+/// instance.
 pub(in crate::light) fn object_starts(words: &[u32], alone: &[u32]) -> Vec<u32> {
     let first = super::first_object(super::records(words).len()).min(words.len());
     let objects = if words.is_empty() { alone } else { &words[first..] };

@@ -10,8 +10,8 @@ use crate::light::{LightKind, LightTriangle, LocalPoint};
 use crate::math;
 use crate::receiver::{ReceiverKind, ShadingPoint};
 
-/// A triangle of an object with the map to the world. Its vertices are mapped in double precision and never rounded, so that
-/// far from the origin an instance keeps its shape.
+/// A triangle of an object with the map to the world. Its vertices are mapped in double precision and never rounded, so
+/// that far from the origin an instance keeps its shape.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlacedTriangle<'a> {
     pub(in crate::light) record: &'a LightTriangle,

@@ -1,8 +1,8 @@
 //! The walk through an object's own light tree, for a shading point in the world.
 //!
-//! The tree is walked in the object's space. For a rotation with a uniform scale, weights there are those in the world; for
-//! any other map, and where the receiver has a lobe, a [`PlacedLobe`] makes them so. Whatever the tree asks about single
-//! triangles and about the environment is answered in the world.
+//! The tree is walked in the object's space. For a rotation with a uniform scale, weights there are those in the world;
+//! for any other map, and where the receiver has a lobe, a [`PlacedLobe`] makes them so. Whatever the tree asks about
+//! single triangles and about the environment is answered in the world.
 
 use glam::Vec3;
 
@@ -16,12 +16,12 @@ use crate::receiver::{PlacedLobe, RoundedPoint, ShadingPoint, for_lobe, own_rece
 use crate::tlas::{FactorBytes, LeafOracle, TlasView};
 use crate::warp::Variate;
 
-/// How far rounding moves a shading point along an axis when it is mapped, relative to its largest coordinate. *Proved*: half a
-/// unit in the last place is 6e-8, and the map itself is in double precision. Larger: less is culled.
+/// How far rounding moves a shading point along an axis when it is mapped, relative to its largest coordinate.
+/// *Proved*: half a unit in the last place is 6e-8, and the map itself is in double precision. Larger: less is culled.
 const POINT_ROUNDING: f32 = 1.5e-7;
 
-/// Margin of a shading point so far away in the object's space that it is moved nearer, relative to its distance. *Proved*: the
-/// object's coordinates, up to 1e9, are 1e-6 of that.
+/// Margin of a shading point so far away in the object's space that it is moved nearer, relative to its distance.
+/// *Proved*: the object's coordinates, up to 1e9, are 1e-6 of that.
 const FAR_ROUNDING: f32 = 1e-5;
 
 /// Largest number of lanes of a node. *Format.*
@@ -68,7 +68,8 @@ macro_rules! for_own_lobe {
 }
 
 impl<'a> ObjectWalk<'a> {
-    /// Prepares a walk; `None` where nothing can arrive. `environment` is what portals show, or `None` for unit radiance.
+    /// Prepares a walk; `None` where nothing can arrive. `environment` is what portals show, or `None` for unit
+    /// radiance.
     pub(crate) fn new(
         placed: &PlacedObject<'a>,
         x: &ShadingPoint,
@@ -96,8 +97,8 @@ impl<'a> ObjectWalk<'a> {
         })
     }
 
-    /// Draws a triangle of the object. Returns its leaf with its probability; `None` where nothing can arrive from the part of
-    /// the object that `u` leads to.
+    /// Draws a triangle of the object. Returns its leaf with its probability; `None` where nothing can arrive from the
+    /// part of the object that `u` leads to.
     pub(crate) fn sample(&self, u: &mut Variate) -> Option<(u32, f64)> {
         for_own_lobe!(self, lobe => self.tree.sample_by(self, lobe, u))
     }
@@ -107,8 +108,8 @@ impl<'a> ObjectWalk<'a> {
         for_own_lobe!(self, lobe => self.tree.pmf_by(below, self, lobe))
     }
 
-    /// Returns an estimate of the irradiance, in units of the object's energy in its own space. Zero only if nothing can
-    /// arrive.
+    /// Returns an estimate of the irradiance, in units of the object's energy in its own space. Zero only if nothing
+    /// can arrive.
     pub(crate) fn irradiance(&self) -> f32 {
         let sum = for_own_lobe!(self, lobe => self.tree.irradiance_by(self, lobe));
         sum.unwrap_or_else(|| self.irradiance_of_one())

@@ -29,8 +29,8 @@ pub struct DiskLight {
 }
 
 impl DiskLight {
-    /// Returns a disk. Light leaves the side that `normal`, of any length, points to. `radiance` is the luminance of what each
-    /// point sends in each direction, as of a mesh.
+    /// Returns a disk. Light leaves the side that `normal`, of any length, points to. `radiance` is the luminance of
+    /// what each point sends in each direction, as of a mesh.
     pub fn new(center: Vec3, normal: Vec3, radius: f32, radiance: f32) -> Self {
         let normal = normal.as_dvec3().normalize_or_zero().as_vec3();
         Self { center, normal, radius, radiance, two_sided: false }
@@ -134,8 +134,9 @@ impl LampKind for DiskLight {
     }
 }
 
-/// Least distance of a disk's center from the line through the point along its normal, relative to the distance of the center.
-/// *Proved*: rounding of 1e-16 turns a direction found from a smaller one by more than 1e-6. A larger one would move disks.
+/// Least distance of a disk's center from the line through the point along its normal, relative to the distance of the
+/// center. *Proved*: rounding of 1e-16 turns a direction found from a smaller one by more than 1e-6. A larger one would
+/// move disks.
 const LEAST_ASIDE: f64 = 1e-10;
 
 /// A disk as seen from a point.
@@ -157,9 +158,9 @@ pub(super) struct DiskView {
 impl DiskView {
     /// Returns the view of a disk whose plane does not hold the point.
     ///
-    /// In the plane through the point, the normal and the center, the disk spans from ρ - r to ρ + r at the distance h. The
-    /// axis of its cone of directions halves that angle, and meets the disk at m (angle bisector theorem). What is not
-    /// written as a difference of like numbers stays exact next to the disk and far from it.
+    /// In the plane through the point, the normal and the center, the disk spans from ρ - r to ρ + r at the distance h.
+    /// The axis of its cone of directions halves that angle, and meets the disk at m (angle bisector theorem). What is
+    /// not written as a difference of like numbers stays exact next to the disk and far from it.
     fn new(center: DVec3, normal: DVec3, radius: f64) -> Self {
         let down = normal * normal.dot(center).signum();
         let height = normal.dot(center).abs();

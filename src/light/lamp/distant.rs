@@ -1,6 +1,7 @@
 //! A light infinitely far away: one direction, or all directions of a cap.
 //!
-//! It has no place, so it is never in the tree over the lights. What samples it is in [`distant`](crate::light::distant).
+//! It has no place, so it is never in the tree over the lights. What samples it is in
+//! [`distant`](crate::light::distant).
 
 use core::f32::consts::{FRAC_PI_2, PI};
 
@@ -21,8 +22,9 @@ const LEAST_RADIUS: f32 = 1e-5;
 /// A light infinitely far away, such as the sun or the moon.
 ///
 /// Without an angular radius, light travels in one direction, and samples are
-/// [`SampledLight::Punctual`](crate::SampledLight::Punctual): `pdf` is a probability. With one, the same irradiance comes
-/// from a cap of directions of constant radiance, and samples are [`SampledLight::Shape`](crate::SampledLight::Shape).
+/// [`SampledLight::Punctual`](crate::SampledLight::Punctual): `pdf` is a probability. With one, the same irradiance
+/// comes from a cap of directions of constant radiance, and samples are
+/// [`SampledLight::Shape`](crate::SampledLight::Shape).
 ///
 /// ```
 /// use fanlight::glam::Vec3;
@@ -46,14 +48,14 @@ pub struct DistantLight {
 }
 
 impl DistantLight {
-    /// Returns a light that travels along `axis`, of any length. `irradiance` is the luminance of the irradiance on a surface
-    /// that faces the light.
+    /// Returns a light that travels along `axis`, of any length. `irradiance` is the luminance of the irradiance on a
+    /// surface that faces the light.
     pub fn new(axis: Vec3, irradiance: f32) -> Self {
         Self { axis: axis.as_dvec3().normalize_or_zero().as_vec3(), irradiance, radius: 0.0 }
     }
 
-    /// Sets the angle in radians from the middle of the light to its rim, as seen from anywhere: from 1e-5 to π, or 0 for a
-    /// light without an extent, which is the default. The irradiance stays the same.
+    /// Sets the angle in radians from the middle of the light to its rim, as seen from anywhere: from 1e-5 to π, or 0
+    /// for a light without an extent, which is the default. The irradiance stays the same.
     pub const fn angular_radius(mut self, radius: f32) -> Self {
         self.radius = radius;
         self

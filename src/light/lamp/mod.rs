@@ -1,8 +1,8 @@
 //! Lights that are not made of triangles: one file a kind, one enum, and the record that a sampler keeps of each.
 //!
-//! A lamp is seen from a shading point in directions: a ray meets the side of it that shines back in one point at most, so
-//! that a point of a lamp *is* the direction to it. Directions are rounded to single precision when they are drawn, and
-//! every density is that of the rounded direction.
+//! A lamp is seen from a shading point in directions: a ray meets the side of it that shines back in one point at most,
+//! so that a point of a lamp *is* the direction to it. Directions are rounded to single precision when they are drawn,
+//! and every density is that of the rounded direction.
 
 mod disk;
 mod distant;
@@ -47,11 +47,12 @@ use tube::TubeView;
 /// Numbers that describe a lamp of any kind. *Format*: what the kind with the most numbers needs.
 const VALUES: usize = 10;
 
-/// Largest difference of the squared length of a rounded unit vector from 1. *Proved*: a component is off by at most 6e-8 of
-/// itself. Larger: a vector that is no unit vector would be taken for one.
+/// Largest difference of the squared length of a rounded unit vector from 1. *Proved*: a component is off by at most
+/// 6e-8 of itself. Larger: a vector that is no unit vector would be taken for one.
 const UNIT_ROUNDING: f64 = 2.5e-7;
 
-/// Least radius and length. *Proved*: areas are normal numbers in single precision. A larger one would refuse tiny lamps.
+/// Least radius and length. *Proved*: areas are normal numbers in single precision. A larger one would refuse tiny
+/// lamps.
 const LEAST_LENGTH: f32 = 1e-15;
 
 /// A light that is not made of triangles.
@@ -176,12 +177,12 @@ trait ShapeViewKind {
     /// Draws a unit direction to the lamp.
     fn draw(&self, u: [Variate; 2]) -> DVec3;
 
-    /// Returns the density per solid angle with which [`Self::draw`] draws a direction that meets the lamp; a probability
-    /// for a lamp without an extent.
+    /// Returns the density per solid angle with which [`Self::draw`] draws a direction that meets the lamp; a
+    /// probability for a lamp without an extent.
     fn pdf(&self, direction: DVec3) -> f64;
 
-    /// Returns the point of the lamp in a direction, relative to the shading point. Rounding may have taken the direction
-    /// past the lamp: then a point at its rim.
+    /// Returns the point of the lamp in a direction, relative to the shading point. Rounding may have taken the
+    /// direction past the lamp: then a point at its rim.
     fn point(&self, direction: DVec3) -> DVec3;
 
     /// Returns the unit normal of the front side in a point relative to the shading point.
@@ -194,8 +195,8 @@ trait ShapeViewKind {
         cosine / (distance2 * math::sqrt64(distance2))
     }
 
-    /// Returns the height of the highest point over a plane through the shading point with this unit normal, and the size
-    /// of the numbers that it was computed from.
+    /// Returns the height of the highest point over a plane through the shading point with this unit normal, and the
+    /// size of the numbers that it was computed from.
     fn highest(&self, normal: DVec3) -> [f64; 2];
 
     /// Estimates the irradiance from the lamp with a weight of 1. Zero only if nothing can arrive.
@@ -478,14 +479,14 @@ pub(super) fn irradiance_of_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
     irradiance_of_directions(receiver, cap.axis, sin, cap.solid_angle())
 }
 
-/// Estimates the irradiance from directions of unit radiance: their middle, the sine of the angle from there to the farthest
-/// of them, and their solid angle. Zero only if nothing can arrive.
+/// Estimates the irradiance from directions of unit radiance: their middle, the sine of the angle from there to the
+/// farthest of them, and their solid angle. Zero only if nothing can arrive.
 fn irradiance_of_directions(receiver: Receiver, axis: DVec3, sin_reach: f64, solid_angle: f64) -> f64 {
     // An angle of zero has no mean.
     let sin = (sin_reach as f32).max(f32::MIN_POSITIVE);
     let mean = f64::from(receiver.mean_over_cone(axis.as_vec3(), sin));
-    // One plus the cosine of the half angle of a cap, halved: of a cap above the horizon, the mean cosine is that of its
-    // middle times this.
+    // One plus the cosine of the half angle of a cap, halved: of a cap above the horizon, the mean cosine is that of
+    // its middle times this.
     let share = if receiver.normal() == Vec3::ZERO { 1.0 } else { (1.0 - solid_angle / (4.0 * PI)).max(0.5) };
     solid_angle * share * mean
 }

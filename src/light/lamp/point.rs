@@ -13,8 +13,8 @@ use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::warp::Variate;
 use crate::warp::spherical_cap::{self, SphericalCap};
 
-/// What makes the intensity of a point compete with radiance times area: a sphere of this area over its radiance has that
-/// intensity. *Proved*: the intensity of a sphere is its radiance times π r², its area is 4 π r².
+/// What makes the intensity of a point compete with radiance times area: a sphere of this area over its radiance has
+/// that intensity. *Proved*: the intensity of a sphere is its radiance times π r², its area is 4 π r².
 const AREA: f32 = 4.0;
 
 /// A point without an extent that sends light in all directions.
@@ -112,8 +112,8 @@ pub(super) struct PointView {
 }
 
 impl PointView {
-    /// Returns the view of a light at `light` from `position`; `None` where nothing can arrive. `intensity` is that in a unit
-    /// direction.
+    /// Returns the view of a light at `light` from `position`; `None` where nothing can arrive. `intensity` is that in
+    /// a unit direction.
     pub(super) fn new(light: Vec3, position: Vec3, intensity: impl FnOnce(DVec3) -> f64) -> Option<Self> {
         let relative = light.as_dvec3() - position.as_dvec3();
         let direction = relative.try_normalize()?;

@@ -15,20 +15,20 @@ use crate::receiver::ShadingPoint;
 use crate::record::ProfileId;
 use crate::warp::Variate;
 
-/// What makes the mean intensity of a profile compete with radiance times area. *Proved*: that of a point of the same intensity
-/// in all directions, whose power is the same; a surface of that power has the same radiance times area.
+/// What makes the mean intensity of a profile compete with radiance times area. *Proved*: that of a point of the same
+/// intensity in all directions, whose power is the same; a surface of that power has the same radiance times area.
 const AREA: f32 = 4.0;
 
-/// Largest vertical angle, in radians, up to which a light counts as one that sends into a cone. *Chosen*: what is wider is no
-/// cone for a node of the tree, whose cones end at a right angle less 0.08.
+/// Largest vertical angle, in radians, up to which a light counts as one that sends into a cone. *Chosen*: what is
+/// wider is no cone for a node of the tree, whose cones end at a right angle less 0.08.
 ///
 /// Larger: wide lights are taken for surfaces. Smaller: fewer lights are culled by their cones.
 const WIDEST_CONE: f32 = 1.45;
 
 /// A point without an extent whose intensity is given by a [`Profile`], such as that of a luminaire.
 ///
-/// Samples of it are [`SampledLight::Punctual`](crate::SampledLight::Punctual), and the tree knows the exact intensity towards
-/// the shading point.
+/// Samples of it are [`SampledLight::Punctual`](crate::SampledLight::Punctual), and the tree knows the exact intensity
+/// towards the shading point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub struct ProfileLight {
@@ -47,8 +47,9 @@ impl ProfileLight {
         Self { position, axis, roll: 0.0, scale, profile: profile.index() }
     }
 
-    /// Turns the light around its axis, so that horizontal angle 0 is in the direction of `zero` as far as it is perpendicular
-    /// to the axis. Horizontal angles grow counter-clockwise around the axis. Without this, horizontal angle 0 is anywhere.
+    /// Turns the light around its axis, so that horizontal angle 0 is in the direction of `zero` as far as it is
+    /// perpendicular to the axis. Horizontal angles grow counter-clockwise around the axis. Without this, horizontal
+    /// angle 0 is anywhere.
     pub fn facing(mut self, zero: Vec3) -> Self {
         let (s, t) = self.axis.as_dvec3().any_orthonormal_pair();
         self.roll = math::atan2_64(zero.as_dvec3().dot(t), zero.as_dvec3().dot(s)) as f32;

@@ -1,4 +1,5 @@
-//! A sphere of constant radiance, sampled by the cone that it fills: by its solid angle, or by the cosine over a surface.
+//! A sphere of constant radiance, sampled by the cone that it fills: by its solid angle, or by the cosine over a
+//! surface.
 
 use core::f32::consts::PI;
 
@@ -20,8 +21,8 @@ use crate::warp::spherical_cap::{self, SphericalCap};
 
 /// A sphere that sends the same radiance from all of its surface.
 ///
-/// Light leaves the outside. Inside the sphere it is dark, unless the sphere has two sides: then its inside sends as well,
-/// and directions are uniform there.
+/// Light leaves the outside. Inside the sphere it is dark, unless the sphere has two sides: then its inside sends as
+/// well, and directions are uniform there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub struct SphereLight {

@@ -14,14 +14,14 @@ use crate::receiver::ShadingPoint;
 use crate::warp::Variate;
 use crate::warp::spherical_cap::SphericalCap;
 
-/// How far rounding to single precision may move a unit vector. *Proved*: 6e-8 a component. A larger one would give densities
-/// to directions beside the cone.
+/// How far rounding to single precision may move a unit vector. *Proved*: 6e-8 a component. A larger one would give
+/// densities to directions beside the cone.
 const DIRECTION_ROUNDING: f64 = 2e-7;
 
 /// A point without an extent that sends light into a cone.
 ///
-/// Up to the inner angle the intensity is constant. From there to the outer angle it falls to zero, by the smooth step of the
-/// cosine (`t² (3 - 2 t)`). Samples of it are [`SampledLight::Punctual`](crate::SampledLight::Punctual).
+/// Up to the inner angle the intensity is constant. From there to the outer angle it falls to zero, by the smooth step
+/// of the cosine (`t² (3 - 2 t)`). Samples of it are [`SampledLight::Punctual`](crate::SampledLight::Punctual).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub struct SpotLight {
@@ -33,9 +33,9 @@ pub struct SpotLight {
 }
 
 impl SpotLight {
-    /// Returns a spot. Light travels along `axis`, of any length. `intensity` is the luminance of the radiant intensity on the
-    /// axis: power per solid angle. `inner` and `outer` are the angles from the axis, in radians up to π/2, between which the
-    /// intensity falls off.
+    /// Returns a spot. Light travels along `axis`, of any length. `intensity` is the luminance of the radiant intensity
+    /// on the axis: power per solid angle. `inner` and `outer` are the angles from the axis, in radians up to π/2,
+    /// between which the intensity falls off.
     pub fn new(position: Vec3, axis: Vec3, intensity: f32, [inner, outer]: [f32; 2]) -> Self {
         Self { position, axis: axis.as_dvec3().normalize_or_zero().as_vec3(), intensity, inner, outer }
     }

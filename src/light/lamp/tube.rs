@@ -1,9 +1,9 @@
 //! The surface of a cylinder of constant radiance, sampled by the solid angle that it fills.
 //!
-//! Across the tube's axis, the directions to it fill an angle that is the same all along. In each of these directions, what is
-//! seen of the tube is a stretch of a line parallel to the axis, whose solid angle is uniform in the sine of the latitude
-//! (Archimedes). So an angle is drawn uniformly, then a sine. The density is that of both, and nearly uniform except next to
-//! the tube.
+//! Across the tube's axis, the directions to it fill an angle that is the same all along. In each of these directions,
+//! what is seen of the tube is a stretch of a line parallel to the axis, whose solid angle is uniform in the sine of
+//! the latitude (Archimedes). So an angle is drawn uniformly, then a sine. The density is that of both, and nearly
+//! uniform except next to the tube.
 
 use core::f32::consts::PI;
 
@@ -33,8 +33,8 @@ pub struct TubeLight {
 }
 
 impl TubeLight {
-    /// Returns a tube around the line between two points. `radiance` is the luminance of what each point of the surface sends
-    /// in each direction, as of a mesh.
+    /// Returns a tube around the line between two points. `radiance` is the luminance of what each point of the surface
+    /// sends in each direction, as of a mesh.
     pub const fn new(ends: [Vec3; 2], radius: f32, radiance: f32) -> Self {
         Self { ends, radius, radiance }
     }
@@ -140,7 +140,8 @@ impl LampKind for TubeLight {
 /// A tube as seen from a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TubeView {
-    /// Unit vectors: to the axis, across both others, and along the axis, so that more of the tube is on its positive side.
+    /// Unit vectors: to the axis, across both others, and along the axis, so that more of the tube is on its positive
+    /// side.
     frame: [DVec3; 3],
     /// Distance of the axis.
     distance: f64,
@@ -199,7 +200,8 @@ impl TubeView {
         beyond / (self.distance * cos.max(0.0) + math::sqrt64(half_chord2))
     }
 
-    /// Returns one less the sines of the latitudes of both ends, at this distance across the axis. The first one is larger.
+    /// Returns one less the sines of the latitudes of both ends, at this distance across the axis. The first one is
+    /// larger.
     fn latitudes(&self, distance: f64) -> [f64; 2] {
         self.heights.map(|height| {
             let length = math::sqrt64(height * height + distance * distance);

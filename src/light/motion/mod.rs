@@ -1,10 +1,11 @@
-//! Lights that move while the shutter is open: where they are at its end, beside the records that say where they are at its
-//! start.
+//! Lights that move while the shutter is open: where they are at its end, beside the records that say where they are at
+//! its start.
 //!
-//! A shading point carries its time, and [`LightsView`](super::LightsView) the same one: a light that is asked for is *made* at
-//! that time. Vertices, and the elements of transforms, are interpolated linearly in double precision; bounds in the tree
-//! hold for the whole interval. What moves is found by the number that it was added with: [`Motion`] is an array of words at
-//! the end of [`Extras`](super::Extras), so that a scene in which nothing moves has none of it, and no walk asks for it.
+//! A shading point carries its time, and [`LightsView`](super::LightsView) the same one: a light that is asked for is
+//! *made* at that time. Vertices, and the elements of transforms, are interpolated linearly in double precision; bounds
+//! in the tree hold for the whole interval. What moves is found by the number that it was added with: [`Motion`] is an
+//! array of words at the end of [`Extras`](super::Extras), so that a scene in which nothing moves has none of it, and
+//! no walk asks for it.
 
 mod lookup;
 #[cfg(test)]
@@ -58,7 +59,8 @@ pub(super) struct MovingMesh {
     start: u32,
 }
 
-/// The ends of all that moves, in borrowed memory: a [`Header`], and then the arrays that it counts. Empty if nothing moves.
+/// The ends of all that moves, in borrowed memory: a [`Header`], and then the arrays that it counts. Empty if nothing
+/// moves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion<'a>(pub(super) &'a [u32]);
 
@@ -74,7 +76,8 @@ impl<'a> Motion<'a> {
         self.0.get(..HEADER).map_or_else(Header::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
     }
 
-    /// Returns so many words after so many of the arrays before. Words that are not there, which validation refuses, give none.
+    /// Returns so many words after so many of the arrays before. Words that are not there, which validation refuses,
+    /// give none.
     fn words(self, before: usize, count: usize) -> &'a [u32] {
         let start = HEADER + before;
         self.0.get(start..start + count).unwrap_or(&[])
@@ -109,7 +112,8 @@ impl<'a> Motion<'a> {
         self.meshes().binary_search_by_key(&first, |mesh| mesh.first).is_ok()
     }
 
-    /// Returns the vertices of a triangle at the end, by its number among all that were added; `None` for one that stands still.
+    /// Returns the vertices of a triangle at the end, by its number among all that were added; `None` for one that
+    /// stands still.
     pub(super) fn end_of_triangle(self, index: u32) -> Option<&'a EndVertices> {
         let meshes = self.meshes();
         let mesh = meshes.get(meshes.partition_point(|mesh| mesh.first <= index).checked_sub(1)?)?;
@@ -172,7 +176,8 @@ impl MotionCollection {
         }
     }
 
-    /// Sets the vertices of the triangles of a mesh by the number of its first one: those of no triangle if it stands still.
+    /// Sets the vertices of the triangles of a mesh by the number of its first one: those of no triangle if it stands
+    /// still.
     pub(super) fn set_mesh(&mut self, first: u32, triangles: Vec<EndVertices>) {
         if triangles.is_empty() {
             self.meshes.remove(&first);

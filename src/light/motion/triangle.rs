@@ -14,14 +14,14 @@ use crate::light::{LightKind, LightTriangle, LocalPoint, storable};
 use crate::math;
 use crate::receiver::{ReceiverKind, ShadingPoint};
 
-/// Number of parts of the interval that cones of normals are found for, one by one. *Chosen*: a triangle that turns by half a
-/// turn has a narrow cone in each.
+/// Number of parts of the interval that cones of normals are found for, one by one. *Chosen*: a triangle that turns by
+/// half a turn has a narrow cone in each.
 ///
 /// Larger: fits take longer. Smaller: fast turns give cones that hold every direction.
 pub(in crate::light) const PARTS: usize = 8;
 
-/// Widening of a cone of normals, in radians, for rounding. *Proved*: axes and angles in single precision are off by about 1e-7
-/// each, as those of the cones that are united. Larger: a little less is culled.
+/// Widening of a cone of normals, in radians, for rounding. *Proved*: axes and angles in single precision are off by
+/// about 1e-7 each, as those of the cones that are united. Larger: a little less is culled.
 const CONE_ROUNDING: f32 = 2e-6;
 
 /// Returns the vertices of triangles at the end of the interval.
@@ -37,8 +37,8 @@ pub(in crate::light) fn has_area_between(start: &[Vec3], end: &[Vec3], indices: 
 }
 
 impl LightTriangle {
-    /// Marks the triangle as one that moves if its vertices are elsewhere at the end of the interval, and as one that stands still
-    /// otherwise.
+    /// Marks the triangle as one that moves if its vertices are elsewhere at the end of the interval, and as one that
+    /// stands still otherwise.
     pub(in crate::light) fn mark_motion(&mut self, end: Option<&EndVertices>) {
         let mark = Self::LAMP | Self::MOVING;
         self.index_and_flags &= !mark;
@@ -111,8 +111,8 @@ impl<'a> MovingTriangle<'a> {
         [0.0, 0.5, 1.0].into_iter().all(|time| self.at(time).normal_and_area().is_none())
     }
 
-    /// Returns a cone that holds the normals at all times: in each part of the interval they lie between the coefficients of the
-    /// area's vector.
+    /// Returns a cone that holds the normals at all times: in each part of the interval they lie between the
+    /// coefficients of the area's vector.
     fn normals(&self) -> Cone {
         let edges = |i: usize| self.at(i as f64 / PARTS as f64).edges();
         let all = (0..PARTS).map(|i| convex_cone(area_vectors(edges(i), edges(i + 1)).map(direction)));
@@ -140,7 +140,8 @@ pub(in crate::light) fn widened(cone: Option<Cone>) -> Cone {
     })
 }
 
-/// Returns the mean over the interval of a function that changes smoothly, by Simpson's rule: exact up to the third degree.
+/// Returns the mean over the interval of a function that changes smoothly, by Simpson's rule: exact up to the third
+/// degree.
 pub(in crate::light) fn simpson(at: impl Fn(f64) -> f64) -> f64 {
     (at(0.0) + 4.0 * at(0.5) + at(1.0)) * (1.0 / 6.0)
 }

@@ -257,8 +257,8 @@ fn near_squares_have_the_right_mean_and_little_noise() {
             }
             let deviation = variances.max(0.0).sqrt();
             std::eprintln!("{h:e} {receiver:?}: {ratios:.5}, {deviation:.3}");
-            // Six standard errors of 150,000 samples. Two thirds of a millionth of the triangle above it, rounding to the
-            // lattice shows.
+            // Six standard errors of 150,000 samples. Two thirds of a millionth of the triangle above it, rounding to
+            // the lattice shows.
             let limit = 6.0 * deviation / 380.0 + if exponent == 6 { 5e-3 } else { 1e-4 };
             assert!((ratios - 1.0).abs() < limit, "{h:e} {receiver:?}: {ratios}");
             assert!(deviation < if exponent <= 6 { 0.3 } else { 0.75 }, "{h:e} {receiver:?}: {deviation}");

@@ -1,4 +1,5 @@
-//! The lobes of a surface with microfacets as the loops need them: one formula for the side of the normal and for the other.
+//! The lobes of a surface with microfacets as the loops need them: one formula for the side of the normal and for the
+//! other.
 
 use core::f32::consts::FRAC_2_PI;
 
@@ -7,15 +8,15 @@ use crate::math::{at_least, at_most, sqrt};
 use crate::receiver::glossy::LEAST_SUM2;
 use crate::receiver::lobe::Lobe;
 
-/// Least part of the determinant in the denominator of the distribution. *Proved*: a half vector of unit length leaves more, but
-/// that of opposite directions is zero. Larger: peaks are cut off.
+/// Least part of the determinant in the denominator of the distribution. *Proved*: a half vector of unit length leaves
+/// more, but that of opposite directions is zero. Larger: peaks are cut off.
 const LEAST_TAIL: f32 = 0.25;
 
 /// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
 const LEAST_DISTANCE2: f32 = 1e-30;
 
-/// Variation of a region that the surface's own plane halves, where the two sides differ. Chosen: what is farther from the plane
-/// than its own deviation counts as constant.
+/// Variation of a region that the surface's own plane halves, where the two sides differ. Chosen: what is farther from
+/// the plane than its own deviation counts as constant.
 ///
 /// Larger: divides cells that are hardly cut. Smaller: the lobe of one side stands for both.
 const PLANE_VARIATION: f32 = 0.16;
@@ -100,8 +101,8 @@ impl MicrofacetLobe {
         Halfway { sum: [ht, hb, hn], inverse2: 1.0 / sum2, along: [1.0 + ior * cosine, cosine + ior] }
     }
 
-    /// Returns the weight of the lobe in a unit direction of the lobe's frame, blurred by a variance of directions. `cosine` is
-    /// the absolute one.
+    /// Returns the weight of the lobe in a unit direction of the lobe's frame, blurred by a variance of directions.
+    /// `cosine` is the absolute one.
     #[inline(always)]
     pub(super) fn value(&self, side: &Side, cosine: f32, [t, b, n]: [f32; 3], spread2: f32) -> f32 {
         let n = side.upright * n;
@@ -145,7 +146,8 @@ impl Lobe for MicrofacetLobe {
         let [t, b, height] = self.local(center);
         let inverse = 1.0 / sqrt(at_least(t * t + b * b + height * height, LEAST_DISTANCE2));
         let side = self.side(height);
-        // What the region has on the other side of the plane: the mean of the absolute height is above that of the height.
+        // What the region has on the other side of the plane: the mean of the absolute height is above that of the
+        // height.
         let other = 0.5 * self.transmits * at_least(toward - height.abs(), 0.0);
         let toward = toward - other;
         let value = self.value(&side, toward / distance, [t * inverse, b * inverse, height * inverse], spread2);

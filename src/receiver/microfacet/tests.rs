@@ -24,8 +24,8 @@ impl Parameters {
             .with_ior(self.ior as f32)
     }
 
-    /// `π f cos θ` from the books: Walter et al. 2007 (equations 20 and 21, with the index on the side of the light squared),
-    /// Heitz 2014 for the anisotropic distribution and Smith's Λ.
+    /// `π f cos θ` from the books: Walter et al. 2007 (equations 20 and 21, with the index on the side of the light
+    /// squared), Heitz 2014 for the anisotropic distribution and Smith's Λ.
     fn scattered(&self, direction: DVec3) -> f64 {
         let outgoing = DVec3::from_array(self.outgoing);
         let (sum, [x, y]) = (self.weights.iter().sum::<f64>(), self.alphas);
@@ -119,8 +119,8 @@ fn isotropic_reflections_are_those_of_glossy_surfaces() {
     }
 }
 
-/// A sample of the transmission that follows the facets that are seen brings as much as it should: its weights add up to the
-/// share of light that masking leaves.
+/// A sample of the transmission that follows the facets that are seen brings as much as it should: its weights add up
+/// to the share of light that masking leaves.
 #[test]
 fn transmitted_light_adds_up() {
     for parameters in lobes().into_iter().filter(|parameters| parameters.weights[2] > 0.0 && parameters.ior >= 1.0) {

@@ -5,12 +5,12 @@ use crate::technique::Viewpoint;
 
 /// Most groups. Chosen on skies of many lamps, not swept.
 ///
-/// Larger: wide groups become smaller ones, each of which costs a walk down the tree over the lights. Smaller: lamps far from
-/// each other share a group, and with it the cosine.
+/// Larger: wide groups become smaller ones, each of which costs a walk down the tree over the lights. Smaller: lamps
+/// far from each other share a group, and with it the cosine.
 pub(super) const MAX_GROUPS: usize = 32;
 
-/// Largest angular radius of a group of several features, as a sine. Chosen on skies of many lamps, not swept; against groups
-/// of one feature, measured (docs/ACCURACY.md, "Bright features").
+/// Largest angular radius of a group of several features, as a sine. Chosen on skies of many lamps, not swept; against
+/// groups of one feature, measured (docs/ACCURACY.md, "Bright features").
 ///
 /// Larger: the cosine varies within a group. Smaller: more walks down the tree over the lights.
 const GROUP_RADIUS: f32 = 0.12;

@@ -7,12 +7,11 @@ use crate::light::LightLeaf;
 use crate::math::{at_least, only_if};
 use crate::warp::sum;
 
-/// Most parts of portals that features are listed through. Of a feature with more parts, directions are drawn as if there
-/// were no walls.
+/// Most parts of portals that features are listed through. Of a feature with more parts, directions are drawn as if
+/// there were no walls.
 ///
-/// A budget: it bounds the time and the memory of a shading point (2.5 kB). Larger: points that see a feature through many
-/// small openings take more time. Smaller: more of them draw directions as if there were
-/// no walls.
+/// A budget: it bounds the time and the memory of a shading point (2.5 kB). Larger: points that see a feature through
+/// many small openings take more time. Smaller: more of them draw directions as if there were no walls.
 pub(super) const MAX_VISIBLE: usize = 64;
 
 /// Stands for all portals.

@@ -1,8 +1,8 @@
 //! The environment's bright features through the portals: a technique next to the trees.
 //!
 //! For every shading point, the parts of portals that a feature is visible through are found, and how much of it each
-//! shows. The irradiance from the features is then known. As a direction towards a feature belongs to a point of a portal,
-//! like those of the trees, the density of a direction is a plain sum over the portals that it crosses.
+//! shows. The irradiance from the features is then known. As a direction towards a feature belongs to a point of a
+//! portal, like those of the trees, the density of a direction is a plain sum over the portals that it crosses.
 
 mod clipped_square;
 mod groups;
@@ -24,11 +24,11 @@ pub(crate) use list::VisibleFeatures;
 use list::{ANY_PORTAL, MAX_VISIBLE, VisibleFeature};
 use view::FeatureView;
 
-/// Least number of parts that are measured of a feature that has more of them than there is room for. *Chosen*: their mean
-/// stands for all others.
+/// Least number of parts that are measured of a feature that has more of them than there is room for. *Chosen*: their
+/// mean stands for all others.
 ///
-/// Larger: more parts are measured where the list is full. Smaller: one small part could stand for many large ones, so that
-/// the feature starves.
+/// Larger: more parts are measured where the list is full. Smaller: one small part could stand for many large ones, so
+/// that the feature starves.
 const LEAST_MEASURED: usize = 16;
 
 impl VisibleFeatures {
@@ -101,8 +101,8 @@ impl VisibleFeatures {
         Some((LightPoint { leaf, point: LocalPoint::on_triangle(point) }, Some(per_excess)))
     }
 
-    /// Returns the density of a point. `known` is an entry of the list that draws the point, with its density over the excess
-    /// of the feature.
+    /// Returns the density of a point. `known` is an entry of the list that draws the point, with its density over the
+    /// excess of the feature.
     #[inline]
     fn density_with(
         &self,

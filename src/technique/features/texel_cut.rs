@@ -1,9 +1,9 @@
 //! How much of one block of a bright feature's texels is visible through an opening.
 //!
-//! The equal-area map bends the edges of a block, in short a texel, only a little. Here it is a parallelogram of directions,
-//! an opening is three planes through the viewer, and the visible part is a square cut by three lines, whose area is
-//! exact. The texel's margin, which bounds the distance between the map and the parallelogram, makes the cut square
-//! hold every visible direction.
+//! The equal-area map bends the edges of a block, in short a texel, only a little. Here it is a parallelogram of
+//! directions, an opening is three planes through the viewer, and the visible part is a square cut by three lines,
+//! whose area is exact. The texel's margin, which bounds the distance between the map and the parallelogram, makes the
+//! cut square hold every visible direction.
 
 use glam::Vec3;
 

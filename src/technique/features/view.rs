@@ -12,11 +12,11 @@ use crate::warp::Variate;
 /// Ratio of a cell's to a feature's angular radius up to which the cell counts as one part, however its texture
 /// varies.
 ///
-/// Chosen, not swept. A step makes cells an eighth as wide, so that the parts of a textured triangle are from half as wide as
-/// the feature to four times as wide. A part is weighed by the mean of those of its children, again an eighth as wide, that
-/// the feature may be visible through. Larger: fewer parts, so that a shading point costs less, but children as wide as the
-/// feature, whose mean says less of what it shines through. Smaller: up to 64 times as many parts, of which the list holds
-/// [`MAX_VISIBLE`](super::list::MAX_VISIBLE).
+/// Chosen, not swept. A step makes cells an eighth as wide, so that the parts of a textured triangle are from half as
+/// wide as the feature to four times as wide. A part is weighed by the mean of those of its children, again an eighth
+/// as wide, that the feature may be visible through. Larger: fewer parts, so that a shading point costs less, but
+/// children as wide as the feature, whose mean says less of what it shines through. Smaller: up to 64 times as many
+/// parts, of which the list holds [`MAX_VISIBLE`](super::list::MAX_VISIBLE).
 const SMALL_CELL: f32 = 4.0;
 
 /// Rounding of a cell's corners relative to the largest coordinate of a vertex. Proved: a corner is a sum of three
@@ -25,16 +25,16 @@ const SMALL_CELL: f32 = 4.0;
 /// Larger: more cells are looked at closely. Smaller: a part of a feature could be missed.
 const ASIDE_ROUNDING: f32 = 1e-5;
 
-/// Rounding of squared distances from the feature's axis, relative to that from the shading point. Proved: a difference of
-/// two sums of three squares in `f32`, with an axis within 3e-7 of unit length, rounded up.
+/// Rounding of squared distances from the feature's axis, relative to that from the shading point. Proved: a difference
+/// of two sums of three squares in `f32`, with an axis within 3e-7 of unit length, rounded up.
 ///
 /// Larger and smaller as [`ASIDE_ROUNDING`].
 const SQUARE_ROUNDING: f32 = 3e-6;
 
 /// Least share of a cell that counts as covered by a feature that may be visible through it. *Chosen*.
 ///
-/// Larger: openings beside the feature count. Smaller: one that shows the feature's edge, and nothing else does, is listed
-/// with next to no weight.
+/// Larger: openings beside the feature count. Smaller: one that shows the feature's edge, and nothing else does, is
+/// listed with next to no weight.
 const LEAST_SHARE: f32 = 0.05;
 
 /// A part of a triangle through which a feature is visible.
@@ -125,8 +125,8 @@ impl<'a> FeatureView<'a> {
         }
     }
 
-    /// Mean of the relative averages of those children of a cell that the feature may be visible through, each counted by
-    /// the share of it that the feature covers.
+    /// Mean of the relative averages of those children of a cell that the feature may be visible through, each counted
+    /// by the share of it that the feature covers.
     fn average_before_feature(&self, corners: &[Vec3; 3], node: u32) -> f32 {
         let averages = blas::averages(self.triangle.cells, node);
         let shares = self.covered_shares(corners);
@@ -151,8 +151,8 @@ impl<'a> FeatureView<'a> {
         Some((point, pmf / f64::from(power)))
     }
 
-    /// Draws a point in a cell of one opacity. `power` is the feature's through the cell, if it is known already. Returns it
-    /// with the point, which lies strictly inside of the cell.
+    /// Draws a point in a cell of one opacity. `power` is the feature's through the cell, if it is known already.
+    /// Returns it with the point, which lies strictly inside of the cell.
     fn sample_in(&self, cell: LatticeCell, power: Option<f32>, u: [Variate; 2]) -> Option<(Lattice, f32)> {
         let opening = self.opening(cell);
         let power = power.unwrap_or_else(|| opening.power(self.environment, self.node));
@@ -180,12 +180,13 @@ impl<'a> FeatureView<'a> {
         &self.environment.feature_nodes()[self.node]
     }
 
-    /// Estimates the share of each child of a cell that the feature covers. It is zero only where nothing of the feature is
-    /// visible through the child: a quick test that decides about most.
+    /// Estimates the share of each child of a cell that the feature covers. It is zero only where nothing of the
+    /// feature is visible through the child: a quick test that decides about most.
     ///
-    /// The directions to a child lie in a cone around that to its center. Where the sines of the radii of two cones add up
-    /// to less than that of the angle between their axes, or than 1 for an obtuse angle, the cones are apart. In between, the
-    /// share grows evenly from cones that touch to one that holds the other, with a disk as wide as the feature is spread.
+    /// The directions to a child lie in a cone around that to its center. Where the sines of the radii of two cones add
+    /// up to less than that of the angle between their axes, or than 1 for an obtuse angle, the cones are apart. In
+    /// between, the share grows evenly from cones that touch to one that holds the other, with a disk as wide as the
+    /// feature is spread.
     fn covered_shares(&self, corners: &[Vec3; 3]) -> [f32; ARITY] {
         let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
         let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));

@@ -12,7 +12,8 @@ use crate::progress::Progress;
 /// for unevenness.
 const MAX_SAOH_DEPTH: u32 = 48;
 
-/// Cost of a cluster of lights of different classes, which no lane may stand for. *Format*: no sum of costs is below it.
+/// Cost of a cluster of lights of different classes, which no lane may stand for. *Format*: no sum of costs is below
+/// it.
 pub(super) const JOINED: f32 = f32::INFINITY;
 
 /// Node of the binary tree. The left child follows its parent, which is why a subtree of `n` leaves takes exactly

@@ -6,8 +6,8 @@ use glam::Vec3A;
 use super::cluster::{Cluster, Item, Units};
 use crate::parallel::reduce;
 
-/// Largest number of bins per axis. *Measured* (docs/ACCURACY.md, "Building without cones"): from 8 to 24 bins the choice is
-/// as good, and each bin costs build time.
+/// Largest number of bins per axis. *Measured* (docs/ACCURACY.md, "Building without cones"): from 8 to 24 bins the
+/// choice is as good, and each bin costs build time.
 const BINS: usize = 10;
 /// Smallest number of bins per axis, for sets of fewer lights than that. More bins than lights stay empty, fewer leave
 /// no choice.

@@ -1,8 +1,8 @@
 //! Lights of different size apart.
 //!
-//! A cluster that holds a large light and small ones has the extent of the large one: from any point near it, its moments
-//! say little of either, and a lamp under a glowing dome starves. So lights are sorted into classes by the diagonals of
-//! their boxes, each class gets a tree of its own, and the root joins these.
+//! A cluster that holds a large light and small ones has the extent of the large one: from any point near it, its
+//! moments say little of either, and a lamp under a glowing dome starves. So lights are sorted into classes by the
+//! diagonals of their boxes, each class gets a tree of its own, and the root joins these.
 
 use smallvec::SmallVec;
 

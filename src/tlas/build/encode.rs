@@ -17,11 +17,11 @@ const BOX_STEPS: f64 = 253.0;
 /// relative to their size, 2^-22 of 255 steps, hundredfold; rounding relative to the distance is granted by the tests
 /// themselves. A larger one widens boxes without need.
 const BOX_MARGIN: f64 = 1.0 / 32.0;
-/// Least unit of the boxes. *Proved*: flat boxes divide by it, and any positive number keeps that from being 0 / 0. A much
-/// larger one would widen the boxes of tiny scenes.
+/// Least unit of the boxes. *Proved*: flat boxes divide by it, and any positive number keeps that from being 0 / 0. A
+/// much larger one would widen the boxes of tiny scenes.
 const LEAST_STEP: f64 = 1e-30;
-/// Length of normals in steps: shorter than [`NORMAL_STEPS`], so that rounding by half a step in each component makes no
-/// normal longer than one (*proved*: √3 / 2 is below 1). The test by the cone is then on the safe side.
+/// Length of normals in steps: shorter than [`NORMAL_STEPS`], so that rounding by half a step in each component makes
+/// no normal longer than one (*proved*: √3 / 2 is below 1). The test by the cone is then on the safe side.
 const NORMAL_SCALE: f32 = NORMAL_STEPS - 1.0;
 /// Widening of a cluster's cone of normals, in radians. Covers the rounding of its construction in `f32`,
 /// about 1e-6 a union. A larger one culls a little less. Chosen with room; `what_is_culled_is_dark` looks for
@@ -34,8 +34,8 @@ const TANGENT_MARGIN: f32 = 2.5e-4;
 /// largest that a code can hold. A smaller one culls less.
 const WIDEST_CONE: f32 = FRAC_PI_2 - 0.08;
 
-/// Least length of a mean normal that is a direction. Below it the axis of the cone stands in; the length itself is then
-/// stored as zero, *format*: half a step of a byte is 2e-3.
+/// Least length of a mean normal that is a direction. Below it the axis of the cone stands in; the length itself is
+/// then stored as zero, *format*: half a step of a byte is 2e-3.
 const LEAST_LENGTH: f32 = 1e-3;
 
 impl<const N: usize> Node<N> {

@@ -14,8 +14,8 @@ use super::binary::{BinaryNode, JOINED};
 use super::classes::MOST_CLASSES;
 use crate::math;
 
-/// Cost of a wide node, relative to the mean cost of all clusters that fit into one. A larger cost gives fewer and fuller
-/// nodes, a smaller one nodes that mislead less. *Measured* (docs/SPEED.md, "Fewer and fuller nodes").
+/// Cost of a wide node, relative to the mean cost of all clusters that fit into one. A larger cost gives fewer and
+/// fuller nodes, a smaller one nodes that mislead less. *Measured* (docs/SPEED.md, "Fewer and fuller nodes").
 const NODE_COST: f32 = 4.0;
 
 /// How to divide one binary node into at most 1, 2 ... `N` lanes.
@@ -68,8 +68,8 @@ fn divide<const N: usize>(binary: &[BinaryNode], forests: &mut [Forest<N>], clas
 }
 
 impl<const N: usize> Forest<N> {
-    /// Returns the forest of a node from those of its children, which fill at most `most` lanes each; as a single lane the
-    /// node costs `own` on top. `may_have` tells which numbers of lanes the two may have together.
+    /// Returns the forest of a node from those of its children, which fill at most `most` lanes each; as a single lane
+    /// the node costs `own` on top. `may_have` tells which numbers of lanes the two may have together.
     fn join(left: &Self, right: &Self, most: [usize; 2], own: f32, may_have: impl Fn(usize, usize) -> bool) -> Self {
         let mut all = Self { cost: [f32::INFINITY; N], left: [0; N] };
         for i in 1..=most[0] {

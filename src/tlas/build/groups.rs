@@ -1,8 +1,8 @@
 //! Lights of different light groups apart.
 //!
-//! A cluster that holds lights of several groups has the energy of all of them. Where a bright one is left out, its cluster
-//! would still be chosen as often, and what is dim elsewhere would starve. So lights of the same groups get trees of their
-//! own, which the root joins, as it does for lights of different size ([`classes`](super::classes)).
+//! A cluster that holds lights of several groups has the energy of all of them. Where a bright one is left out, its
+//! cluster would still be chosen as often, and what is dim elsewhere would starve. So lights of the same groups get
+//! trees of their own, which the root joins, as it does for lights of different size ([`classes`](super::classes)).
 
 use alloc::collections::BTreeMap;
 use alloc::vec;
@@ -22,8 +22,8 @@ use crate::tlas::tree::Tlas;
 /// Larger: fewer lanes of the root for each. Smaller: lights of more sets share the last tree.
 const MOST_SETS: usize = 4;
 
-/// Sorts lights into classes, by sets of groups first and by size then. Returns the number of lights in each class. Sets with
-/// less energy than the first ones share the last.
+/// Sorts lights into classes, by sets of groups first and by size then. Returns the number of lights in each class.
+/// Sets with less energy than the first ones share the last.
 pub(super) fn divide_groups(items: &mut [Item], groups: &[u32], arity: Arity) -> SmallVec<[usize; MOST_CLASSES]> {
     let set = |item: &Item| groups[item.light as usize];
     let mut energies = BTreeMap::new();

@@ -1,6 +1,6 @@
-//! How the tree is made: first lights of different size are set apart ([`classes`]), then a binary tree arranges those of
-//! each class ([`binary`]), then comes the wide tree whose nodes are
-//! cuts through it ([`collapse`]), and last what its nodes say of their children ([`fit`]).
+//! How the tree is made: first lights of different size are set apart ([`classes`]), then a binary tree arranges those
+//! of each class ([`binary`]), then comes the wide tree whose nodes are cuts through it ([`collapse`]), and last what
+//! its nodes say of their children ([`fit`]).
 
 mod binary;
 mod bins;
@@ -29,9 +29,9 @@ use crate::progress::{Cancelled, Progress};
 use crate::tlas::arity::Arity;
 use crate::tlas::tree::Tlas;
 
-/// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds them all in
-/// one node. Returns it with the lights in the order of its leaves; its nodes know no bounds until [`Tlas::fit`]. Every light
-/// that has found its place is a unit of progress.
+/// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds
+/// them all in one node. Returns it with the lights in the order of its leaves; its nodes know no bounds until
+/// [`Tlas::fit`]. Every light that has found its place is a unit of progress.
 #[cfg(test)]
 pub(crate) fn build(
     arity: Arity,
@@ -42,9 +42,10 @@ pub(crate) fn build(
     build_in_groups(arity, count, light, &[], progress)
 }
 
-/// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds them all in
-/// one node. `groups` are the light groups of each, or nothing. Returns the tree with the lights in the order of its leaves; its
-/// nodes know no bounds until [`Tlas::fit`]. Every light that has found its place is a unit of progress.
+/// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds
+/// them all in one node. `groups` are the light groups of each, or nothing. Returns the tree with the lights in the
+/// order of its leaves; its nodes know no bounds until [`Tlas::fit`]. Every light that has found its place is a unit of
+/// progress.
 pub(crate) fn build_in_groups(
     arity: Arity,
     count: usize,
@@ -73,8 +74,8 @@ pub(crate) fn build_in_groups(
     Ok((tlas, order))
 }
 
-/// Arranges lights in a tree of just this arity, without a look at their sizes or groups: a part of a larger tree. Returns what
-/// [`build_in_groups`] does; `None` for fewer than two lights.
+/// Arranges lights in a tree of just this arity, without a look at their sizes or groups: a part of a larger tree.
+/// Returns what [`build_in_groups`] does; `None` for fewer than two lights.
 pub(super) fn arrange(arity: Arity, lights: &[LightBounds]) -> Option<(Tlas, Vec<u32>)> {
     let count = lights.len();
     if count < 2 {

@@ -18,8 +18,8 @@ impl FreeBlocks {
         self.count
     }
 
-    /// Takes a block of this length from the shortest that is long enough; `None` if there is none. What is left of it stays
-    /// free.
+    /// Takes a block of this length from the shortest that is long enough; `None` if there is none. What is left of it
+    /// stays free.
     pub(super) fn take(&mut self, length: usize) -> Option<usize> {
         let found = (length..=MAX_LANES).find(|found| !self.by_length[found - 1].is_empty())?;
         let first = self.by_length[found - 1].pop()? as usize;

@@ -1,17 +1,18 @@
 //! Edits of a finished tree: leaves come, go and change, and the tree follows, in time that does not grow with it.
 //!
-//! The leaves of a node are neighbors in memory, and so are the nodes below it. A node that gets one child more moves its
-//! children to a free place that has room for them, and leaves theirs to others ([`blocks`]). A new leaf goes down from the
-//! root, to the child that grows least in the surface area orientation heuristic (Conty Estevez and Kulla 2018, section 4.1),
-//! until a node has room; a full node of leaves gives the new leaf and the leaf next to it a node of their own ([`place`]).
+//! The leaves of a node are neighbors in memory, and so are the nodes below it. A node that gets one child more moves
+//! its children to a free place that has room for them, and leaves theirs to others ([`blocks`]). A new leaf goes down
+//! from the root, to the child that grows least in the surface area orientation heuristic (Conty Estevez and Kulla
+//! 2018, section 4.1), until a node has room; a full node of leaves gives the new leaf and the leaf next to it a node
+//! of their own ([`place`]).
 //!
-//! What a node says of its children is computed from their exact bounds ([`TreeState`] keeps those of all nodes), by the code
-//! that fits a built tree. So an edited tree says what a fresh fit of the same shape would say, however many edits there
-//! have been. Only nodes above an edit are fitted again, once for a whole batch.
+//! What a node says of its children is computed from their exact bounds ([`TreeState`] keeps those of all nodes), by
+//! the code that fits a built tree. So an edited tree says what a fresh fit of the same shape would say, however many
+//! edits there have been. Only nodes above an edit are fitted again, once for a whole batch.
 //!
-//! The shape gets worse with every leaf that comes or goes. A subtree in which there were half as many such edits as it has
-//! leaves is built again ([`rebuild`]), as in a scapegoat tree (Galperin and Rivest 1993), which costs each edit a constant share of a
-//! build at each level of the tree.
+//! The shape gets worse with every leaf that comes or goes. A subtree in which there were half as many such edits as it
+//! has leaves is built again ([`rebuild`]), as in a scapegoat tree (Galperin and Rivest 1993), which costs each edit a
+//! constant share of a build at each level of the tree.
 
 mod blocks;
 mod place;
@@ -32,11 +33,11 @@ use crate::bounds::{LightBounds, Moments};
 use blocks::FreeBlocks;
 pub(crate) use relayout::relayout;
 
-/// Edits of a subtree's shape, relative to its number of leaves, after which it is built again. *Measured* on edited clouds
-/// (docs/ACCURACY.md, "Edits").
+/// Edits of a subtree's shape, relative to its number of leaves, after which it is built again. *Measured* on edited
+/// clouds (docs/ACCURACY.md, "Edits").
 ///
-/// Larger: choices get noisier between builds. Smaller: edits take longer. It must be below 1 (*proved*): a subtree of new leaves
-/// alone has more leaves than edits, and would never be built again, however deep it is.
+/// Larger: choices get noisier between builds. Smaller: edits take longer. It must be below 1 (*proved*): a subtree of
+/// new leaves alone has more leaves than edits, and would never be built again, however deep it is.
 const REBUILT_SHARE: f32 = 0.5;
 
 /// Fewest edits after which a subtree is built again. *Chosen*: two nodes of leaves.
@@ -44,8 +45,8 @@ const REBUILT_SHARE: f32 = 0.5;
 /// Larger: small subtrees get worse. Smaller: small subtrees are built for a handful of edits.
 const LEAST_EDITS: u32 = 32;
 
-/// Depth from which on a new leaf looks for a subtree above it that is to be built again, without waiting for the end of the
-/// batch. *Chosen*: more than twice the depth of a built tree of a million lights.
+/// Depth from which on a new leaf looks for a subtree above it that is to be built again, without waiting for the end
+/// of the batch. *Chosen*: more than twice the depth of a built tree of a million lights.
 ///
 /// Larger: long batches of lights at one place take longer. Smaller: deep trees are searched in vain.
 const DEEP: usize = 32;
@@ -196,8 +197,8 @@ impl<S: LeafStore> TreeEdit<'_, S> {
         in_arity!(self, wide => wide.update(leaf));
     }
 
-    /// Ends a batch: fits what has changed, and builds again what has changed too much. `arity` is that of large trees. Returns
-    /// whether all was built again.
+    /// Ends a batch: fits what has changed, and builds again what has changed too much. `arity` is that of large trees.
+    /// Returns whether all was built again.
     pub(crate) fn finish(&mut self, arity: Arity) -> bool {
         if self.is_worn() || (self.tlas.arity != arity && self.leaf_count() > self.tlas.arity.lanes()) {
             self.rebuild(arity);

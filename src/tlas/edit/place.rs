@@ -13,8 +13,8 @@ use crate::tlas::node::{Child, Node, Slot, words};
 /// Larger: thin shapes do not count. Smaller: of clusters in one line, none grows.
 const PAD: f32 = 1e-3;
 
-/// Rounding granted to the angle between a normal and the axis of a cone, in radians. *Chosen*: a light that is taken for one
-/// outside only looks for a place again.
+/// Rounding granted to the angle between a normal and the axis of a cone, in radians. *Chosen*: a light that is taken
+/// for one outside only looks for a place again.
 const ANGLE_ROUNDING: f32 = 1e-3;
 
 /// What a new leaf would add to the cost of a cluster.
@@ -25,8 +25,8 @@ struct Growth<'b> {
 }
 
 impl Growth<'_> {
-    /// Returns the cost of the cluster with the new light, less `own` of its cost without; of a growth that is not below
-    /// `least`, any number that is not.
+    /// Returns the cost of the cluster with the new light, less `own` of its cost without; of a growth that is not
+    /// below `least`, any number that is not.
     fn of(&self, cluster: &LightBounds, own: f64, least: f64) -> f64 {
         let measure = |theta: f32, two_sided: bool| f64::from(orientation_measure(math::sin_cos(theta).1, two_sided));
         let area = |aabb: &Aabb| {
@@ -189,8 +189,8 @@ impl<const N: usize, S: LeafStore> WideEdit<'_, N, S> {
         light
     }
 
-    /// Removes a node without children, passes the leaves of one that its parent has room for on to the parent, and lets the
-    /// only child of a node take its place.
+    /// Removes a node without children, passes the leaves of one that its parent has room for on to the parent, and
+    /// lets the only child of a node take its place.
     fn tidy(&mut self, mut index: usize) {
         while let Some((parent, lane)) = self.tlas.parents[index].get::<N>() {
             let [first_node, nodes, first, leaves] = self.children(index);

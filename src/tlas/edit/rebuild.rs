@@ -9,8 +9,8 @@ use crate::tlas::arity::Arity;
 use crate::tlas::build::{arrange, build_in_groups};
 use crate::tlas::node::{Child, Node, Slot};
 
-/// Energy of a light that is switched off, for the build, which expects all lights to have some. *Chosen*: far below that of any
-/// light.
+/// Energy of a light that is switched off, for the build, which expects all lights to have some. *Chosen*: far below
+/// that of any light.
 const LEAST_ENERGY: f32 = 1e-36;
 
 /// Returns the bounds by which a light finds its place.

@@ -30,8 +30,8 @@ pub(crate) struct Beam {
 }
 
 impl Beam {
-    /// Returns the area of a cluster perpendicular to the beam, relative to its area: zero only if all of it is seen from
-    /// behind.
+    /// Returns the area of a cluster perpendicular to the beam, relative to its area: zero only if all of it is seen
+    /// from behind.
     #[inline]
     pub(crate) fn projection(&self, axis: Vec3, [sin, cos]: [f32; 2], normal: Vec3, two_sided: bool) -> f32 {
         let [sin_r, cos_r] = self.spread;

@@ -100,8 +100,8 @@ impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for SampleWalk<'_, N, S, L> 
     }
 }
 
-/// Several ways down, interleaved by steps, and each step in two halves: while one way waits for memory or for sums, the
-/// others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
+/// Several ways down, interleaved by steps, and each step in two halves: while one way waits for memory or for sums,
+/// the others go on. A machine looks ahead by about one step, so that it would not find the next one by itself.
 struct InterleavedWalks<'a, const N: usize, S, L> {
     tlas: &'a WideTree<'a, N>,
     walks: &'a mut [Descent<S, L>],
@@ -235,8 +235,8 @@ impl<const N: usize> WideTree<'_, N> {
         for_lobe!(receiver, lobe => InstructionSet::best().run(PmfWalk { tlas: self, leaf, oracle, lobe, first }))
     }
 
-    /// Returns the weights of the root's children, which add up to an estimate of the irradiance in units of the sum of all
-    /// energies; `None` for a tree without nodes.
+    /// Returns the weights of the root's children, which add up to an estimate of the irradiance in units of the sum of
+    /// all energies; `None` for a tree without nodes.
     pub(crate) fn first_weights(&self, oracle: &impl LeafOracle) -> Option<FirstWeights> {
         (!self.nodes.is_empty()).then(|| FirstWeights::new(self.weigh(0, oracle)))
     }

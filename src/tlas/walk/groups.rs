@@ -4,8 +4,8 @@ use super::importance::Estimates;
 use crate::tlas::tree::WideTree;
 
 impl<const N: usize> WideTree<'_, N> {
-    /// Returns the estimates of a node's children, zero for those that hold no light in any of these light groups. Cold, so
-    /// that scenes without groups keep estimates in registers.
+    /// Returns the estimates of a node's children, zero for those that hold no light in any of these light groups.
+    /// Cold, so that scenes without groups keep estimates in registers.
     #[cold]
     #[inline(never)]
     pub(super) fn within_groups(&self, index: usize, groups: u32, mut estimates: Estimates<N>) -> Estimates<N> {

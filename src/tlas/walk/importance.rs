@@ -8,9 +8,9 @@
 //! The lobe of a receiver is weighed in the direction to a cluster's mean, widened by the variance of the positions
 //! ([`Lobe`]).
 //!
-//! Moments say little of what is near the shading point, and one direction says little of a cluster over which a lobe varies.
-//! Such a cluster is opened, which means that the sum of its own children's weights is its weight. A light near the point is
-//! weighed by its exact irradiance.
+//! Moments say little of what is near the shading point, and one direction says little of a cluster over which a lobe
+//! varies. Such a cluster is opened, which means that the sum of its own children's weights is its weight. A light near
+//! the point is weighed by its exact irradiance.
 
 use glam::Vec3;
 
@@ -28,8 +28,8 @@ pub(crate) trait LeafOracle {
 
     /// Writes mean radiances, relative to the mean over all directions, of what portals show in the directions from the
     /// shading point to balls with these centers (by axis, relative to the shading point) and radii. A radiance is zero
-    /// only where all of it is black. All slices are of one length. Only the elements in `set`, a set of bits, are asked
-    /// for; all are zero before.
+    /// only where all of it is black. All slices are of one length. Only the elements in `set`, a set of bits, are
+    /// asked for; all are zero before.
     ///
     /// Must be `#[inline(always)]`: the length is then a constant, and loops over it become vectors.
     fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]);
@@ -41,14 +41,15 @@ pub(crate) trait LeafOracle {
     /// that open.
     fn is_visible(&self, leaf: u32) -> bool;
 
-    /// Returns the irradiance from a leaf of unit radiance, per area of it. Rounding may make it zero. Asked only of leaves
-    /// near the shading point.
+    /// Returns the irradiance from a leaf of unit radiance, per area of it. Rounding may make it zero. Asked only of
+    /// leaves near the shading point.
     fn irradiance_per_area(&self, leaf: u32) -> f32;
 
     /// Whether anything is known of what walls hide from the shading point.
     fn has_factors(&self) -> bool;
 
-    /// Returns what is known of the children of a node, as bytes that stand for factors ([`factor`](super::learned::factor)).
+    /// Returns what is known of the children of a node, as bytes that stand for factors
+    /// ([`factor`](super::learned::factor)).
     fn factors(&self, node: u32) -> Option<&FactorBytes>;
 }
 
@@ -92,17 +93,19 @@ impl<O: LeafOracle> LeafOracle for &O {
 /// Cosine at the lights up to which a single triangle is asked whether it is visible. *Proved*: covers the rounding of
 /// normals, at most √3 / 2 of 1 / 510. A larger one only asks more often.
 const EDGE_COSINE: f32 = 3e-3;
-/// Radius of a child's ball, relative to the distance of its center, from which on the child counts as near. *Measured* on
-/// clouds, spheres, domes and windows (docs/ACCURACY.md, "Opening what is near").
+/// Radius of a child's ball, relative to the distance of its center, from which on the child counts as near. *Measured*
+/// on clouds, spheres, domes and windows (docs/ACCURACY.md, "Opening what is near").
 ///
 /// Larger: the moments of clusters around the point are trusted. Smaller: more children are opened, which costs time.
 const OPENING: f32 = 0.7;
-/// Variation of a lobe over a cluster from which on the cluster is opened. *Measured* on clouds (docs/ACCURACY.md, "Lobes").
+/// Variation of a lobe over a cluster from which on the cluster is opened. *Measured* on clouds (docs/ACCURACY.md,
+/// "Lobes").
 ///
 /// Larger: lights off the peak are mistaken for those in it. Smaller: more clusters are opened, which costs time.
 const MIXED_LOBE: f32 = 0.8;
-/// Least weight of a leaf near the shading point, relative to that by its moments. It stands in for what rounding takes from
-/// the exact irradiance. *Chosen*: below a thousandth of the largest weight, `f32` still has the irradiance to 1e-3.
+/// Least weight of a leaf near the shading point, relative to that by its moments. It stands in for what rounding takes
+/// from the exact irradiance. *Chosen*: below a thousandth of the largest weight, `f32` still has the irradiance to
+/// 1e-3.
 ///
 /// Larger: more samples of triangles that the point hardly sees. Smaller: what rounding takes away is not sampled.
 const LEAST_NEAR_SHARE: f32 = 1e-3;
@@ -119,7 +122,8 @@ const EMITTER_VARIANCE_SHARE: f32 = 1.0 / 3.0;
 const RECEIVER_VARIANCE_SHARE: f32 = 0.8;
 /// Share of the positions' variance, for the directions that a lobe is widened by. Measured: docs/ACCURACY.md, "Lobes".
 ///
-/// Larger: the choice follows the lobe less. Smaller: clusters off the peak starve though some of their lights are in it.
+/// Larger: the choice follows the lobe less. Smaller: clusters off the peak starve though some of their lights are in
+/// it.
 const DIRECTION_VARIANCE_SHARE: f32 = 0.5;
 /// Share of the positions' variance, for the squared distance.
 const DISTANCE_VARIANCE_SHARE: f32 = 0.3;

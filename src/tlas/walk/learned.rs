@@ -1,7 +1,8 @@
-//! Factors on the weights of a node's children that the oracle has learned: how much of what a child sends gets through.
+//! Factors on the weights of a node's children that the oracle has learned: how much of what a child sends gets
+//! through.
 //!
-//! They come after everything else that decides about a weight, and only where the oracle has any. No factor is zero, so what
-//! is possible stays possible.
+//! They come after everything else that decides about a weight, and only where the oracle has any. No factor is zero,
+//! so what is possible stays possible.
 
 use super::importance::{Estimates, LeafOracle};
 use crate::math::only_if;
@@ -38,8 +39,8 @@ impl<const N: usize> Node<N> {
 }
 
 impl<const N: usize> WideTree<'_, N> {
-    /// Returns the weight of an opened child, of which `sum` is that of its own children: these have their own factors, or all
-    /// have that of the child.
+    /// Returns the weight of an opened child, of which `sum` is that of its own children: these have their own factors,
+    /// or all have that of the child.
     #[inline(never)]
     pub(super) fn inherited(&self, index: usize, lane: u32, child: usize, oracle: &impl LeafOracle, sum: f32) -> f32 {
         if oracle.factors(child as u32).is_some() {

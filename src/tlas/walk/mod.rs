@@ -1,7 +1,7 @@
 //! What is asked of a finished tree. Whatever draws a leaf has its density next to it, by the same weights.
 //!
-//! The methods of [`TlasView`] look at the arity once and leave the walk to those of [`WideTree`](super::tree::WideTree)
-//! of the same name.
+//! The methods of [`TlasView`] look at the arity once and leave the walk to those of
+//! [`WideTree`](super::tree::WideTree) of the same name.
 
 mod beam;
 pub(in crate::tlas) mod descend;
@@ -107,8 +107,8 @@ impl TlasView<'_> {
         for_arity!(self, tree => tree.clusters_along(stretch, groups))
     }
 
-    /// Calls `visit` for each leaf whose box parallel rays in a direction, a unit vector, may meet that start on a stretch of
-    /// another ray.
+    /// Calls `visit` for each leaf whose box parallel rays in a direction, a unit vector, may meet that start on a
+    /// stretch of another ray.
     pub(crate) fn meet_strip(&self, stretch: &Stretch, direction: Vec3, visit: impl FnMut(u32)) {
         for_arity!(self, tree => tree.meet_strip(stretch, direction, visit));
     }

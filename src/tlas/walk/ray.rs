@@ -12,8 +12,8 @@ use crate::tlas::tree::WideTree;
 /// operations of 6e-8 each, fiftyfold. A larger one visits a few more leaves.
 const RAY_WIDENING: f32 = 1e-5;
 
-/// Number of levels whose waiting lanes are kept on the stack; below them they are computed again on the way back. Affects
-/// time alone. Chosen: a balanced tree of 2^28 leaves has 14 levels even with four lanes.
+/// Number of levels whose waiting lanes are kept on the stack; below them they are computed again on the way back.
+/// Affects time alone. Chosen: a balanced tree of 2^28 leaves has 14 levels even with four lanes.
 const KEPT_LEVELS: usize = 24;
 
 impl<const N: usize> WideTree<'_, N> {

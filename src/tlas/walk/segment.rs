@@ -1,9 +1,9 @@
 //! Clusters of lights as seen from a stretch of a ray, for points that are to be chosen on it.
 //!
-//! What a light in a medium sends to the points of a ray, without anything in between, integrates to the angle that the ray's
-//! ends subtend at the light over the light's distance from the ray (Kulla and Fajardo 2012, section 4.1). A cluster counts as
-//! a light at its mean position, whose distance is widened by the variance of the positions. Clusters that are large for their
-//! distance are opened, as far as there is room.
+//! What a light in a medium sends to the points of a ray, without anything in between, integrates to the angle that the
+//! ray's ends subtend at the light over the light's distance from the ray (Kulla and Fajardo 2012, section 4.1). A
+//! cluster counts as a light at its mean position, whose distance is widened by the variance of the positions. Clusters
+//! that are large for their distance are opened, as far as there is room.
 
 use glam::Vec3;
 use smallvec::SmallVec;
@@ -27,13 +27,13 @@ const ACROSS_SHARE: f32 = 2.0 / 3.0;
 ///
 /// Larger: fewer clusters, which mislead more. Smaller: more time for what is far away.
 const OPENED_SPREAD: f32 = 0.2;
-/// Least distance from the ray, relative to the length of the stretch. *Chosen*: below it the density is finite, and the even
-/// share of the distances takes over.
+/// Least distance from the ray, relative to the length of the stretch. *Chosen*: below it the density is finite, and
+/// the even share of the distances takes over.
 ///
 /// Larger: less is gained next to a light. Smaller: nothing but rounding.
 const LEAST_DISTANCE: f32 = 1e-4;
-/// Rounding granted to the distance of a box from a strip, relative to that from its start. *Proved*: sums of a few products,
-/// 1e-6. A larger one visits a few more leaves.
+/// Rounding granted to the distance of a box from a strip, relative to that from its start. *Proved*: sums of a few
+/// products, 1e-6. A larger one visits a few more leaves.
 const STRIP_ROUNDING: f32 = 1e-5;
 
 /// A stretch of a ray.

@@ -1,8 +1,9 @@
 //! Children whose lights do not send over the hemisphere around their normal: in all directions, or into a narrow cone.
 //!
 //! The loop over all lanes takes every light for a surface. For these children it is no proof of darkness too many, but
-//! asks about leaves that need not be asked about, and knows of no cone that is narrower than a hemisphere (θe below π/2:
-//! Conty Estevez and Kulla 2018, section 4.1). This pass corrects both, and scenes of triangles alone do not run it.
+//! asks about leaves that need not be asked about, and knows of no cone that is narrower than a hemisphere (θe below
+//! π/2: Conty Estevez and Kulla 2018, section 4.1). This pass corrects both, and scenes of triangles alone do not run
+//! it.
 
 use glam::Vec3;
 
@@ -12,8 +13,8 @@ use crate::receiver::{Lobe, ReceiverLanes};
 use crate::simd::{InstructionSet, Kernel};
 use crate::tlas::node::{Child, LANE_TWO_SIDED, Node, WIDE, wide};
 
-/// Rounding granted to the distance from a cone, relative to that of the cluster. *Proved*: covers the rounding of the axis to
-/// ten bits a component, which is in the angle of the cone, and of the sums, 1e-6. A larger one culls less.
+/// Rounding granted to the distance from a cone, relative to that of the cluster. *Proved*: covers the rounding of the
+/// axis to ten bits a component, which is in the angle of the cone, and of the sums, 1e-6. A larger one culls less.
 const CONE_ROUNDING: f32 = 1e-5;
 
 impl<const N: usize> Node<N> {
@@ -71,8 +72,8 @@ impl<const N: usize> Node<N> {
     }
 }
 
-/// Finds three sets of bits: children that are marked, children some of which send everywhere, and children above the horizon
-/// for certain.
+/// Finds three sets of bits: children that are marked, children some of which send everywhere, and children above the
+/// horizon for certain.
 struct LaneSets<'a, const N: usize, L> {
     node: &'a Node<N>,
     x: &'a ReceiverLanes<L>,

@@ -1,5 +1,5 @@
-//! Walks through one tree within another: the lights of an object, by a lobe that says how the object is placed, and the
-//! instances above them. What the choice of an instance leaves of a random number chooses among its lights.
+//! Walks through one tree within another: the lights of an object, by a lobe that says how the object is placed, and
+//! the instances above them. What the choice of an instance leaves of a random number chooses among its lights.
 
 use super::FirstWeights;
 use super::descend::NodeWeights;
@@ -24,8 +24,8 @@ impl TlasView<'_> {
         for_arity!(self, tree => for_lobe!(oracle.shading_point().receiver, lobe => tree.sample_on(oracle, lobe, first, u)))
     }
 
-    /// Draws a leaf by a given lobe. Returns it with its probability; `None` where nothing can arrive from the part of the
-    /// tree that `u` leads to.
+    /// Draws a leaf by a given lobe. Returns it with its probability; `None` where nothing can arrive from the part of
+    /// the tree that `u` leads to.
     pub(crate) fn sample_by(&self, oracle: &impl LeafOracle, lobe: impl Lobe, u: &mut Variate) -> Option<(u32, f64)> {
         for_arity!(self, tree => tree.sample_on(oracle, lobe, None, u))
     }
@@ -35,20 +35,20 @@ impl TlasView<'_> {
         for_arity!(self, tree => tree.pmf_by(leaf, oracle, lobe))
     }
 
-    /// Returns the sum of the weights of the root's children by a given lobe: an estimate of the irradiance in units of the
-    /// sum of all energies. `None` for a tree without nodes.
+    /// Returns the sum of the weights of the root's children by a given lobe: an estimate of the irradiance in units of
+    /// the sum of all energies. `None` for a tree without nodes.
     pub(crate) fn irradiance_by(&self, oracle: &impl LeafOracle, lobe: impl Lobe) -> Option<f32> {
         for_arity!(self, tree => (!tree.nodes.is_empty()).then(|| tree.weigh_by(0, oracle, lobe).iter().sum()))
     }
 
-    /// Calls `visit` for each leaf whose box, widened by a margin, the ray from `origin` along `direction` (need not be a
-    /// unit vector) crosses.
+    /// Calls `visit` for each leaf whose box, widened by a margin, the ray from `origin` along `direction` (need not be
+    /// a unit vector) crosses.
     pub(crate) fn cross_within(&self, origin: Vec3, direction: Vec3, margin: f32, visit: impl FnMut(u32)) {
         for_arity!(self, tree => tree.cross_within(origin, direction, margin, visit));
     }
 
-    /// Calls `visit` for each leaf whose box may hold a point within a distance of a cone around a unit vector, with an angular
-    /// radius of this sine and cosine.
+    /// Calls `visit` for each leaf whose box may hold a point within a distance of a cone around a unit vector, with an
+    /// angular radius of this sine and cosine.
     pub(crate) fn meet_within(&self, origin: Vec3, axis: Vec3, cone: [f32; 2], margin: f32, visit: impl FnMut(u32)) {
         for_arity!(self, tree => tree.meet_within(origin, axis, cone, margin, visit));
     }

@@ -12,8 +12,8 @@ use super::scene::Scene;
 /// 4^-13 of a triangle.
 const DEEPEST: u32 = 13;
 
-/// Where the density per solid angle is constant over cells, those whose integral is less in doubt are not divided either:
-/// edges of cells by solid angle cross all others, at any depth.
+/// Where the density per solid angle is constant over cells, those whose integral is less in doubt are not divided
+/// either: edges of cells by solid angle cross all others, at any depth.
 const NEGLIGIBLE_DOUBT: f64 = 5e-7;
 
 /// Barycentric coordinates that every density is exact for are multiples of this.
@@ -107,8 +107,8 @@ impl<'a> OnTriangle<'a> {
         Self { deepest, most, enough, ..self }
     }
 
-    /// Leaves cells undivided that are so many times as probable, or so many times as much in doubt, whichever way the density
-    /// is constant.
+    /// Leaves cells undivided that are so many times as probable, or so many times as much in doubt, whichever way the
+    /// density is constant.
     pub(crate) fn coarser(self, factor: f64) -> Self {
         Self { coarser: factor, ..self }
     }
@@ -178,8 +178,8 @@ impl<'a> OnTriangle<'a> {
 
     /// Integrals over the cells of a depth, in the order of [`bin`]. Cells are divided as long as the density differs
     /// inside of them: between the middles of their quarters, of the quarters of these, or at one of the `probes`;
-    /// those that matter most come first. Probes only tell where to look closer; samples do well. Second, what cells which
-    /// were too small to divide can be wrong by, five standard errors.
+    /// those that matter most come first. Probes only tell where to look closer; samples do well. Second, what cells
+    /// which were too small to divide can be wrong by, five standard errors.
     pub(crate) fn integrate(&self, bin_depth: u32, least_depth: u32, probes: &[[f32; 2]]) -> (Vec<f64>, f64) {
         let probes = probes.iter().map(|b| (b.map(f64::from), self.density(b.map(f64::from)))).collect();
         let mut walk = Walk::new(self, bin_depth, least_depth);

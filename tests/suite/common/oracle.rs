@@ -42,8 +42,8 @@ fn glossy(surface: &Glossy, direction: DVec3) -> f64 {
     kd * cos_i + ks * distribution * masking / (4.0 * cos_o)
 }
 
-/// `π f |cos θ|` of a diffuse base, a reflection and a transmission, as Walter et al. 2007 (with the index on the side of the
-/// light squared) and Heitz 2014 have it, by Smith's Λ.
+/// `π f |cos θ|` of a diffuse base, a reflection and a transmission, as Walter et al. 2007 (with the index on the side
+/// of the light squared) and Heitz 2014 have it, by Smith's Λ.
 fn microfacets(surface: &Microfacet, direction: DVec3) -> f64 {
     let (n, t) = (surface.normal().as_dvec3(), surface.tangent().as_dvec3());
     let local = |v: DVec3| DVec3::new(t.dot(v), n.cross(t).dot(v), n.dot(v));

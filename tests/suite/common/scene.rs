@@ -284,8 +284,8 @@ const LEAST_ROUGHNESS: f32 = 0.1;
 /// The same of microfacets, which are narrower along an axis and in a refraction.
 const LEAST_MICROFACETS: f32 = 0.3;
 
-/// A random point of one of twelve kinds: three receivers, the same with lobes and with microfacets, the first again with the
-/// least effort.
+/// A random point of one of twelve kinds: three receivers, the same with lobes and with microfacets, the first again
+/// with the least effort.
 pub(crate) fn point_of_kind(pcg: &mut Pcg32, kind: usize) -> ShadingPoint {
     let x = random_point(pcg, kind);
     match kind {
@@ -296,8 +296,8 @@ pub(crate) fn point_of_kind(pcg: &mut Pcg32, kind: usize) -> ShadingPoint {
     }
 }
 
-/// The same point with a lobe: a glossy surface in place of a surface, of a roughness between `least` and 1, and a phase
-/// function in a volume.
+/// The same point with a lobe: a glossy surface in place of a surface, of a roughness between `least` and 1, and a
+/// phase function in a volume.
 pub(crate) fn with_lobe(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> ShadingPoint {
     let (any, kind, roughness) = (pcg.direction(), pcg.below(8), least.powf(pcg.f32()));
     let (Receiver::Surface(normal) | Receiver::Transmissive(normal)) = x.receiver else {
@@ -315,8 +315,8 @@ pub(crate) fn with_lobe(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> Shading
     ShadingPoint::glossy(x.position, Glossy::new(normal, outgoing, roughness).with_weights(diffuse, 1.0))
 }
 
-/// The same point with microfacets of roughnesses between `least` and 1 along a tangent and across: opaque in place of a
-/// surface, and with a transmission in place of all others.
+/// The same point with microfacets of roughnesses between `least` and 1 along a tangent and across: opaque in place of
+/// a surface, and with a transmission in place of all others.
 pub(crate) fn with_microfacets(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> ShadingPoint {
     let (any, tangent, kind) = (pcg.direction(), pcg.direction(), pcg.below(8));
     let (normal, transmits) = match x.receiver {

@@ -1,7 +1,7 @@
 //! How much the statistical tests do.
 //!
-//! `cargo test` does little of everything; `FANLIGHT_TIER=full cargo test --release --test suite -- --include-ignored` does
-//! what is behind the figures of the documentation. No tolerance depends on the tier.
+//! `cargo test` does little of everything; `FANLIGHT_TIER=full cargo test --release --test suite -- --include-ignored`
+//! does what is behind the figures of the documentation. No tolerance depends on the tier.
 
 use std::sync::OnceLock;
 

@@ -235,8 +235,8 @@ impl World {
         matches!(id, Id::Lamp(id) if matches!(self.lamps[&id].0, Lamp::Spot(_)))
     }
 
-    /// Whether the probabilities of all lights add up to one: no part of the light is sampled without a choice of a light first,
-    /// and no cluster turns out to be dark.
+    /// Whether the probabilities of all lights add up to one: no part of the light is sampled without a choice of a
+    /// light first, and no cluster turns out to be dark.
     pub(crate) fn is_complete(&self) -> bool {
         self.kind / 4 < 2 && !self.lights().any(|id| self.is_doubtful(id))
     }

@@ -1,5 +1,5 @@
-//! Scenes of instances with the same scene flattened. All coordinates and maps are multiples of powers of two, so that the
-//! vertices of the flattened scene are exact.
+//! Scenes of instances with the same scene flattened. All coordinates and maps are multiples of powers of two, so that
+//! the vertices of the flattened scene are exact.
 
 use fanlight::{
     Arity, Hit, Instance, InstanceId, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, ObjectId,
@@ -34,7 +34,8 @@ pub(crate) struct Town {
     origins: Vec<Origin>,
 }
 
-/// A map of a kind: 0 rotation and uniform scale, 1 non-uniform scale, 2 mirror image, 3 shear, 4 any, 5 far from the origin.
+/// A map of a kind: 0 rotation and uniform scale, 1 non-uniform scale, 2 mirror image, 3 shear, 4 any, 5 far from the
+/// origin.
 pub(crate) fn transform(kind: usize, pcg: &mut Pcg32) -> Affine3A {
     let turned = Mat3::from_cols(Vec3::new(2.0, 2.0, -1.0), Vec3::new(-1.0, 2.0, 2.0), Vec3::new(2.0, -1.0, 2.0));
     let turns = [turned, turned.transpose(), 3.0 * Mat3::IDENTITY];

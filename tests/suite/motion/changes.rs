@@ -1,4 +1,5 @@
-//! What changes what moves, and what refuses it: bytes, refits, groups, triangles that have no area at some time, errors.
+//! What changes what moves, and what refuses it: bytes, refits, groups, triangles that have no area at some time,
+//! errors.
 
 use super::{Case, close};
 use crate::common::lights::{ARITIES, aligned};
@@ -205,8 +206,8 @@ fn lamp<'a>(positions: &'a [Vec3; 3], end: Option<&'a [Vec3; 3]>) -> Mesh<'a> {
     end.map_or(mesh, |end| mesh.moving_to(end))
 }
 
-/// Where edits take away half of what stands still and add something else, what moves goes on as in a new build, and is refused
-/// if it is edited itself.
+/// Where edits take away half of what stands still and add something else, what moves goes on as in a new build, and is
+/// refused if it is edited itself.
 #[test]
 fn edits_leave_what_moves() {
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];

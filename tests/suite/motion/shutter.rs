@@ -1,5 +1,5 @@
-//! Scenes that move, with the same scenes as they are at one time. Coordinates and maps are multiples of powers of two at all
-//! quarters of the interval, so that what the tests compare with is exact there.
+//! Scenes that move, with the same scenes as they are at one time. Coordinates and maps are multiples of powers of two
+//! at all quarters of the interval, so that what the tests compare with is exact there.
 
 use fanlight::{Arity, Hit, Instance, LightSample, LightSampler, LightSamplerBuilder, Mesh, ShadingPoint};
 use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};

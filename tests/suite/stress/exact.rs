@@ -54,8 +54,8 @@ pub(crate) fn irradiance(scene: &Scene, x: &ShadingPoint, ones: bool) -> Irradia
     sum
 }
 
-/// How many steps of barycentric coordinates, which have 24 bits, what matters of the nearest light is wide. `detail` is
-/// the angle that its smallest bright part is seen under.
+/// How many steps of barycentric coordinates, which have 24 bits, what matters of the nearest light is wide. `detail`
+/// is the angle that its smallest bright part is seen under.
 pub(crate) fn steps(scene: &Scene, x: &ShadingPoint, detail: f64) -> f64 {
     const STEP: f64 = 1.0 / (1 << 24) as f64;
     /// Solid angle of a light that matters.

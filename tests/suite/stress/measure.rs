@@ -60,8 +60,8 @@ pub(crate) struct Found {
     pub(crate) samples: usize,
 }
 
-/// Everything about one cell. A sample that is no number is a panic. The estimates are those of a host without a lobe at `x`,
-/// which `guide` may have.
+/// Everything about one cell. A sample that is no number is a panic. The estimates are those of a host without a lobe
+/// at `x`, which `guide` may have.
 pub(crate) fn measure(
     (row, lights): (&Row, &LightSampler),
     at: &dyn Point,

@@ -1,7 +1,8 @@
 //! Every call of `fanlight` is in this file: emitters and sky as the crate's documentation recommends.
 //!
-//! One sampler holds the emitters and the portals, and the sky where no portal leads to it. A sample on an emitter stands for
-//! that point alone; a sample on a portal stands for the sky along the direction, through whatever portals the ray crosses.
+//! One sampler holds the emitters and the portals, and the sky where no portal leads to it. A sample on an emitter
+//! stands for that point alone; a sample on a portal stands for the sky along the direction, through whatever portals
+//! the ray crosses.
 
 use fanlight::{
     Effort, Environment, Filter, Glossy, Hit, LightSample, LightSampler, Mesh, MeshId, PointSampler, SampledLight,

@@ -151,8 +151,8 @@ impl Method {
         with!(self, lighting => render_pass(world, &**lighting, bounces, random, film.add_pass()));
     }
 
-    /// Asks for light at vertices, as the path tracer does: [`Lighting::at`], the samples and their densities. Returns a
-    /// number that depends on all answers.
+    /// Asks for light at vertices, as the path tracer does: [`Lighting::at`], the samples and their densities. Returns
+    /// a number that depends on all answers.
     pub(crate) fn call(&self, vertices: &[Vertex], random: &mut Pcg32) -> f32 {
         with!(self, lighting => call(&**lighting, vertices, random))
     }

@@ -7,7 +7,8 @@ use glam::{DVec3, Vec3};
 
 use crate::geometry::Rectangle;
 
-/// Solid angle below which a rectangle is not sampled, in steradians: less cannot be told from the rounding of its angles.
+/// Solid angle below which a rectangle is not sampled, in steradians: less cannot be told from the rounding of its
+/// angles.
 const SMALLEST: f64 = 1e-9;
 
 /// A rectangle as seen from a point. The names are those of the paper.

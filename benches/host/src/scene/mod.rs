@@ -65,7 +65,7 @@ pub(crate) struct Scene {
     pub(crate) emitters: Vec<Emitter>,
     pub(crate) portals: Vec<Portal>,
     pub(crate) sky: Option<Sky>,
-    /// Two corners of the box that holds all surfaces, if it is a closed one: rounding puts some points near its corners
-    /// on the wrong side of a wall, where a single one in the sun outshines the corner.
+    /// Two corners of the box that holds all surfaces, if it is a closed one: rounding puts some points near its
+    /// corners on the wrong side of a wall, where a single one in the sun outshines the corner.
     pub(crate) inside: Option<[Vec3; 2]>,
 }

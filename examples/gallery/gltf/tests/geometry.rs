@@ -22,7 +22,8 @@ fn instances() {
     }
 }
 
-/// Lamps turned, stretched and mirrored by two nodes, of which one has copies: passed in once, or as all their triangles.
+/// Lamps turned, stretched and mirrored by two nodes, of which one has copies: passed in once, or as all their
+/// triangles.
 #[test]
 fn instances_of_emitters() {
     let mut file = File::lamp();

@@ -1,4 +1,5 @@
-//! Reads files that the tests make: a lamp of one square meter two meters above a floor, and what else there is to a file.
+//! Reads files that the tests make: a lamp of one square meter two meters above a floor, and what else there is to a
+//! file.
 
 mod broken;
 mod geometry;
