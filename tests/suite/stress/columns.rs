@@ -63,7 +63,7 @@ pub(crate) fn with_lobe(x: ShadingPoint, turn: usize) -> ShadingPoint {
             _ => (across + normal).normalize(),
         }
     };
-    match x.receiver {
+    let guide = match x.receiver {
         Receiver::Surface(normal) if turn % 2 == 0 => {
             ShadingPoint::glossy(x.position, Glossy::new(normal, outgoing(normal), roughness))
         }
@@ -76,7 +76,8 @@ pub(crate) fn with_lobe(x: ShadingPoint, turn: usize) -> ShadingPoint {
             ShadingPoint::microfacet(x.position, glass.with_ior([1.0, 1.5, 0.66][turn % 3]))
         }
         _ => ShadingPoint::scattering(x.position, Scattering::new(along, [0.99, -0.7, 0.3][turn % 3])),
-    }
+    };
+    guide.at_time(x.time())
 }
 
 /// A normal over whose horizon a tip rises, but not the centre.
