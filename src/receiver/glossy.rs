@@ -21,7 +21,8 @@ use glam::Vec3;
 
 use super::lambert::{lambert, solid_angle};
 use super::lanes::ReceiverLanes;
-use super::lobe::{EVEN_SHARE, Lobe, SPREAD_OF_RADIUS2, unit_or_zero};
+use super::lobe::{EVEN_SHARE, Lobe, unit_or_zero};
+use super::parts::mean_over_parts;
 use super::surface::Surface;
 use super::{HeightWeights, ReceiverKind, unit};
 use crate::math::{at_least, at_most, only_if, sqrt};
@@ -44,12 +45,6 @@ pub(super) const LEAST_WEIGHT: f32 = 1e-3;
 
 /// Least squared length of the sum of two unit vectors. *Proved*: rounding leaves as much of opposite ones.
 pub(super) const LEAST_SUM2: f32 = 1e-7;
-
-/// Points along an edge of a triangle whose irradiance is found by its parts.
-///
-/// Chosen. Larger: closer for narrow lobes next to large triangles, for a time in proportion to the square. Smaller:
-/// the opposite.
-pub(super) const PARTS: usize = 4;
 
 /// A surface with a glossy reflection over a diffuse base, seen from an outgoing direction.
 ///
@@ -289,33 +284,10 @@ impl ReceiverKind for Glossy {
     /// The diffuse part is exact. The lobe's is the sum over small parts, each weighed at its center.
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
         let lobe = self.lobe();
-        let [a, b, c] = *vertices;
-        let (e1, e2) = (b - a, c - a);
-        let step = 1.0 / PARTS as f32;
-        let area = 0.5 * step * step * e1.cross(e2).length();
-        let center = (a + b + c) * (1.0 / 3.0);
-        let radius2 = vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
-        let variance = SPREAD_OF_RADIUS2 * step * step * radius2;
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for i in 0..PARTS {
-            // Every second part is inverted, and the last of a row has no partner.
-            for j in 0..2 * (PARTS - i) - 1 {
-                let inverted = 1.0 + (j % 2) as f32;
-                let [b1, b2] = [i, j / 2].map(|k| (k as f32 + inverted * (1.0 / 3.0)) * step);
-                let p = a + e1 * b1 + e2 * b2;
-                let softened = p.length_squared() + 0.25 * area;
-                let distance = sqrt(softened);
-                // The area's height over the point is the same everywhere.
-                let solid_angle = 1.0 / (softened * distance);
-                let cosine = self.normal.dot(p) / distance;
-                weight += solid_angle;
-                if cosine > 0.0 {
-                    let direction = (p / distance).to_array();
-                    sum += solid_angle * lobe.value(cosine, direction, variance / softened);
-                }
-            }
-        }
-        let mean = if weight > 0.0 { sum / weight } else { 0.0 };
+        let mean = mean_over_parts(vertices, |point, distance, variance| {
+            let cosine = self.normal.dot(point) / distance;
+            (cosine > 0.0).then(|| lobe.value(cosine, (point / distance).to_array(), variance))
+        });
         lobe.diffuse * lambert(self.normal, vertices) + mean * solid_angle(vertices) * (1.0 / PI)
     }
 

@@ -23,10 +23,11 @@ use core::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::glossy::{LEAST_OUTGOING, LEAST_ROUGHNESS, LEAST_WEIGHT, PARTS};
+use super::glossy::{LEAST_OUTGOING, LEAST_ROUGHNESS, LEAST_WEIGHT};
 use super::lambert::{lambert, solid_angle};
 use super::lanes::ReceiverLanes;
-use super::lobe::{EVEN_SHARE, Lobe, SPREAD_OF_RADIUS2, unit_or_zero};
+use super::lobe::{EVEN_SHARE, Lobe, unit_or_zero};
+use super::parts::mean_over_parts;
 use super::surface::Surface;
 use super::transmissive::Transmissive;
 use super::{Glossy, HeightWeights, Receiver, ReceiverKind, unit};
@@ -390,33 +391,11 @@ impl ReceiverKind for Microfacet {
     /// The diffuse part is exact. The lobes' is the sum over small parts, each weighed at its center.
     fn irradiance(self, vertices: &[Vec3; 3]) -> f32 {
         let lobe = self.lobe();
-        let [a, b, c] = *vertices;
-        let (e1, e2) = (b - a, c - a);
-        let step = 1.0 / PARTS as f32;
-        let area = 0.5 * step * step * e1.cross(e2).length();
-        let center = (a + b + c) * (1.0 / 3.0);
-        let radius2 = vertices.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
-        let variance = SPREAD_OF_RADIUS2 * step * step * radius2;
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for i in 0..PARTS {
-            // Every second part is inverted, and the last of a row has no partner.
-            for j in 0..2 * (PARTS - i) - 1 {
-                let inverted = 1.0 + (j % 2) as f32;
-                let [b1, b2] = [i, j / 2].map(|k| (k as f32 + inverted * (1.0 / 3.0)) * step);
-                let p = a + e1 * b1 + e2 * b2;
-                let softened = p.length_squared() + 0.25 * area;
-                let distance = sqrt(softened);
-                // The area's height over the point is the same everywhere.
-                let solid_angle = 1.0 / (softened * distance);
-                let [t, b, n] = lobe.local((p / distance).to_array());
-                weight += solid_angle;
-                if n > 0.0 || self.transmits() {
-                    let side = lobe.side(n);
-                    sum += solid_angle * lobe.value(&side, n.abs(), [t, b, n], variance / softened);
-                }
-            }
-        }
-        let mean = if weight > 0.0 { sum / weight } else { 0.0 };
+        let mean = mean_over_parts(vertices, |point, distance, variance| {
+            let [t, b, n] = lobe.local((point / distance).to_array());
+            let is_seen = n > 0.0 || self.transmits();
+            is_seen.then(|| lobe.value(&lobe.side(n), n.abs(), [t, b, n], variance))
+        });
         let [above, below] = lobe.sides;
         let opposite = if self.transmits() { below.even * lambert(-self.normal, vertices) } else { 0.0 };
         above.even * lambert(self.normal, vertices) + opposite + mean * solid_angle(vertices) * (1.0 / PI)

@@ -11,6 +11,7 @@ mod lambert;
 mod lanes;
 mod lobe;
 mod microfacet;
+mod parts;
 mod placed;
 mod scattering;
 mod surface;
