@@ -3,6 +3,7 @@
 
 use core::f64::consts::{PI, TAU};
 
+use crate::common::bytes::check_changes;
 use crate::common::hostile::hostile;
 use crate::common::lights::{aligned, sample_split};
 use crate::common::pcg::Pcg32;
@@ -351,30 +352,7 @@ fn changed_bytes_are_refused_or_harmless() {
     let mut pcg = Pcg32::new(7, 166);
     let twins: Vec<Twin> = (0..40).map(|i| twin(pcg.direction(), RADII[i % RADII.len()])).collect();
     let lights = build(&twins);
-    let words = aligned(&lights.to_bytes());
-    let (mut refused, mut loaded) = (0, 0);
-    for at in 0..words.len() {
-        for change in [1 << 15, 1 << 30, u32::MAX] {
-            let mut changed = words.clone();
-            changed[at] ^= change;
-            let Ok(view) = LightSamplerView::from_bytes(bytemuck::cast_slice(&changed)) else {
-                refused += 1;
-                continue;
-            };
-            loaded += 1;
-            for receiver in receivers(&mut pcg) {
-                let at = view.at(&ShadingPoint::new(Vec3::ZERO, receiver));
-                for _ in 0..3 {
-                    if let Some(sample) = at.sample(pcg.cube()) {
-                        assert!(sample.pdf > 0.0 && sample.pdf.is_finite() && sample.position.is_finite());
-                        assert!(at.pdf_sample_direction(&sample) > 0.0);
-                    }
-                }
-                assert!(at.pdf_direction(pcg.direction()).is_finite());
-            }
-        }
-    }
-    assert!(refused > 200 && loaded > 200, "{refused} refused, {loaded} loaded");
+    check_changes(&lights, &[1 << 15, 1 << 30, u32::MAX], Vec3::ZERO, &mut pcg);
 }
 
 /// Photons into a ball: their power, their densities, and what they bring to a floor.

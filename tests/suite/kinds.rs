@@ -4,6 +4,7 @@
 
 use core::f64::consts::{PI, TAU};
 
+use crate::common::bytes::check_changes;
 use crate::common::hostile::hostile;
 use crate::common::lights::{ARITIES, aligned, sample_split};
 use crate::common::parallel;
@@ -340,36 +341,8 @@ fn changed_bytes_of_lamps_are_refused_or_harmless() {
     let mut pcg = Pcg32::new(7, 146);
     let lamps = kinds(&mut pcg);
     let lights = build(&lamps);
-    let words = aligned(&lights.to_bytes());
-    let (mut refused, mut loaded) = (0, 0);
-    for at in 0..words.len() {
-        for change in [1, 1 << 15, 1 << 23, 1 << 30, 1 << 31, u32::MAX] {
-            let mut changed = words.clone();
-            changed[at] ^= change;
-            let Ok(view) = LightSamplerView::from_bytes(bytemuck::cast_slice(&changed)) else {
-                refused += 1;
-                continue;
-            };
-            loaded += 1;
-            for receiver in receivers(&mut pcg) {
-                let at = view.at(&ShadingPoint::new(Vec3::splat(0.3), receiver));
-                for _ in 0..4 {
-                    if let Some(sample) = at.sample(pcg.cube()) {
-                        assert!(
-                            sample.pdf > 0.0 && sample.pdf.is_finite() && sample.position.is_finite(),
-                            "{sample:?}"
-                        );
-                        assert!(at.pdf_sample_direction(&sample) > 0.0);
-                    }
-                }
-                assert!(at.pdf_direction(pcg.direction()).is_finite());
-            }
-        }
-    }
-    assert!(refused > 200 && loaded > 200, "{refused} refused, {loaded} loaded");
-    for end in 0..words.len() {
-        assert!(LightSamplerView::from_bytes(bytemuck::cast_slice(&words[..end])).is_err());
-    }
+    let flips = [1, 1 << 15, 1 << 23, 1 << 30, 1 << 31, u32::MAX];
+    check_changes(&lights, &flips, Vec3::splat(0.3), &mut pcg);
 }
 
 /// Rays of light: their densities agree, and the power that leaves a closed surface around all is known.

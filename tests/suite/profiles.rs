@@ -3,12 +3,12 @@
 
 use core::f32::consts::{FRAC_PI_2, PI, TAU};
 
-use crate::common::lights::{ARITIES, aligned};
+use crate::common::bytes::check_changes;
+use crate::common::lights::ARITIES;
 use crate::common::pcg::Pcg32;
 use crate::common::statistics::Mean;
 use fanlight::{
-    LightId, LightSampler, LightSamplerView, PointLight, Profile, ProfileId, ProfileLight, Receiver, SampledLight,
-    ShadingPoint,
+    LightId, LightSampler, PointLight, Profile, ProfileId, ProfileLight, Receiver, SampledLight, ShadingPoint,
 };
 use glam::{DVec3, Vec3};
 
@@ -249,31 +249,7 @@ fn profiles_survive_bytes_and_refits() {
         builder.add_light(place(table, profile, &mut pcg).lamp).expect("a valid lamp");
     }
     let mut lights = builder.build().expect("few lights");
-    let words = aligned(&lights.to_bytes());
-    let view = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
-    assert_eq!(view.to_bytes(), lights.to_bytes());
-    let (mut refused, mut loaded) = (0, 0);
-    for at in 0..words.len() {
-        for change in [1 << 15, 1 << 30, u32::MAX] {
-            let mut changed = words.clone();
-            changed[at] ^= change;
-            let Ok(view) = LightSamplerView::from_bytes(bytemuck::cast_slice(&changed)) else {
-                refused += 1;
-                continue;
-            };
-            loaded += 1;
-            let at = view.at(&ShadingPoint::volume(Vec3::splat(0.3)));
-            for _ in 0..3 {
-                if let Some(sample) = at.sample(pcg.cube()) {
-                    assert!(sample.pdf > 0.0 && sample.pdf.is_finite() && sample.position.is_finite());
-                }
-                if let Some(ray) = view.emission().sample(core::array::from_fn(|_| pcg.f32())) {
-                    assert!(ray.pdf > 0.0 && ray.pdf.is_finite() && ray.direction.is_finite(), "{ray:?}");
-                }
-            }
-        }
-    }
-    assert!(refused > 200 && loaded > 200, "{refused} refused, {loaded} loaded");
+    check_changes(&lights, &[1 << 15, 1 << 30, u32::MAX], Vec3::splat(0.3), &mut pcg);
     let id = LightId::from_index(1);
     lights.refit_lights(&[(id, PointLight::new(Vec3::ZERO, 1.0).into())]).expect("a valid update");
     let moved = place(&tables[1], ProfileId::from_index(1), &mut pcg);

@@ -1,11 +1,11 @@
 //! Lights that project an image: lookup, choices against exact irradiances, photons, bytes, errors.
 
-use crate::common::lights::{ARITIES, aligned};
+use crate::common::bytes::check_changes;
+use crate::common::lights::ARITIES;
 use crate::common::pcg::Pcg32;
 use crate::common::statistics::{Mean, chi_square, sidak};
 use fanlight::{
-    Filter, LightId, LightSampler, LightSamplerView, ProfileId, ProfileLight, Projection, Receiver, SampledLight,
-    ShadingPoint,
+    Filter, LightId, LightSampler, ProfileId, ProfileLight, Projection, Receiver, SampledLight, ShadingPoint,
 };
 use glam::{DVec3, Vec3};
 
@@ -293,31 +293,7 @@ fn projections_survive_bytes() {
         builder.add_light(place(slide, id, &mut pcg).lamp).expect("a valid light");
     }
     let lights = builder.build().expect("few lights");
-    let words = aligned(&lights.to_bytes());
-    let view = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
-    assert_eq!(view.to_bytes(), lights.to_bytes());
-    let (mut refused, mut loaded) = (0, 0);
-    for at in 0..words.len() {
-        for change in [1 << 15, 1 << 30, 1 << 31, u32::MAX] {
-            let mut changed = words.clone();
-            changed[at] ^= change;
-            let Ok(view) = LightSamplerView::from_bytes(bytemuck::cast_slice(&changed)) else {
-                refused += 1;
-                continue;
-            };
-            loaded += 1;
-            let at = view.at(&ShadingPoint::volume(Vec3::splat(0.3)));
-            for _ in 0..3 {
-                if let Some(sample) = at.sample(pcg.cube()) {
-                    assert!(sample.pdf > 0.0 && sample.pdf.is_finite() && sample.position.is_finite());
-                }
-                if let Some(ray) = view.emission().sample(core::array::from_fn(|_| pcg.f32())) {
-                    assert!(ray.pdf > 0.0 && ray.pdf.is_finite() && ray.direction.is_finite(), "{ray:?}");
-                }
-            }
-        }
-    }
-    assert!(refused > 200 && loaded > 200, "{refused} refused, {loaded} loaded");
+    check_changes(&lights, &[1 << 15, 1 << 30, 1 << 31, u32::MAX], Vec3::splat(0.3), &mut pcg);
 }
 
 #[test]

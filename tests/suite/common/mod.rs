@@ -1,5 +1,6 @@
 //! What the acceptance tests share. Everything here knows the crate by its public interface alone.
 
+pub(crate) mod bytes;
 pub(crate) mod density;
 pub(crate) mod hostile;
 pub(crate) mod lights;
