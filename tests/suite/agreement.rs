@@ -152,7 +152,7 @@ fn samples_for_lobes_have_the_density_that_pdf_finds() {
 #[test]
 fn samples_for_microfacets_have_the_density_that_pdf_finds() {
     let [scenes, samples] = tier().agreement;
-    examine_all(scenes, samples / 5, 2, shading_point_with_microfacets);
+    examine_all(scenes, samples / 25, 2, shading_point_with_microfacets);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LEAST_EFFORT, LOBES, MICROFACETS, Scene, point_of_kind, random_point};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
-use crate::common::tier::{few, some, tier};
+use crate::common::tier::{few, fewer, some, tier};
 use fanlight::{Arity, Hit, ShadingPoint, Splitting};
 use glam::Vec3;
 
@@ -107,12 +107,12 @@ fn samples_for_lobes_fill_the_cells_of_triangles_as_the_density_says() {
 
 #[test]
 fn samples_of_the_least_effort_fill_the_cells_of_triangles_as_the_density_says() {
-    check_cells(LEAST_EFFORT, few);
+    check_cells(LEAST_EFFORT, fewer);
 }
 
 #[test]
 fn samples_for_microfacets_fill_the_cells_of_triangles_as_the_density_says() {
-    check_cells(MICROFACETS, few);
+    check_cells(MICROFACETS, fewer);
 }
 
 /// With three kinds of receivers from `first` on.

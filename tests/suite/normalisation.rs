@@ -7,7 +7,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LEAST_EFFORT, LOBES, MICROFACETS, Scene, point_of_kind};
 use crate::common::statistics::{binomial_p, sidak};
-use crate::common::tier::{few, some, tier};
+use crate::common::tier::{few, fewer, some, tier};
 use fanlight::{Hit, LightSample, LightSampler, ShadingPoint};
 use glam::Vec3;
 
@@ -20,6 +20,9 @@ const SIGNIFICANCE: f64 = 0.01;
 /// How much coarser the integral over a scene of so many triangles is. Among many of them, the density takes all kinds
 /// of cells.
 const COARSER: f64 = 5.0;
+/// How much finer the integral of the least effort is. *Measured*: with 1, one of 20 integrals is off by 1.3e-4, as a density that
+/// does not follow the sky has larger steps.
+const FINER: f64 = 0.1;
 const MANY: usize = 100;
 /// Triangles that together have less probability than this are left out.
 const NEGLIGIBLE: f64 = 2e-5;
@@ -106,7 +109,11 @@ fn examine_moved(
     let samples: Vec<_> = (0..count).filter_map(|_| at.sample(pcg.cube())).collect();
     let probing = &samples[..samples.len().min(2000)];
     let is_coarse = content.triangles >= MANY;
-    let coarser = if is_coarse { COARSER } else { 1.0 };
+    let coarser = match receiver {
+        _ if is_coarse => COARSER,
+        LEAST_EFFORT.. => FINER,
+        _ => 1.0,
+    };
     let (integral, unresolved) = integral(&scene, &lights, &x, probing, coarser, wrong);
     let name = format!("{} {arities:?} {:?} {x:?}", scene.name, scene.illumination);
     Found { name, integral, unresolved, is_coarse, samples: count, missed: count - samples.len() }
@@ -238,17 +245,15 @@ fn with_lobes_the_shortfall_is_the_rate_of_none() {
 
 #[test]
 fn with_the_least_effort_the_shortfall_is_the_rate_of_none() {
-    check_elsewhere(false, LEAST_EFFORT, few, [11, 3, 6]);
+    check_elsewhere(false, LEAST_EFFORT, fewer, [11, 3, 6]);
 }
 
 #[test]
 fn with_microfacets_the_shortfall_is_the_rate_of_none() {
     // Their densities take long to integrate: single triangles through glass, and in the full tier a third of the
     // others.
-    let fewer = |count: usize| {
-        if tier().stride > 1 { vec![1, 4] } else { few(count).into_iter().step_by(3).collect() }
-    };
-    check_elsewhere(false, MICROFACETS, fewer, [11, 3, 6]);
+    let numbers = |count: usize| if tier().stride > 1 { vec![1, 4] } else { fewer(count) };
+    check_elsewhere(false, MICROFACETS, numbers, [11, 3, 6]);
 }
 
 #[test]

@@ -72,3 +72,8 @@ pub(crate) fn some(count: usize) -> Vec<usize> {
 pub(crate) fn few(count: usize) -> Vec<usize> {
     (0..count).step_by(tier().wide_stride).collect()
 }
+
+/// As [`few`], and a third of them in the full tier, where each takes long.
+pub(crate) fn fewer(count: usize) -> Vec<usize> {
+    few(count).into_iter().step_by(if tier().stride > 1 { 1 } else { 3 }).collect()
+}
