@@ -207,7 +207,7 @@ fn a_small_matrix_with_lobes_holds() {
 }
 
 #[test]
-#[ignore = "release tier: half a minute; cargo test --release --test suite -- --ignored --nocapture table"]
+#[ignore = "by hand: many minutes; cargo test --release --test suite -- --ignored --nocapture table_with_lobes"]
 fn table_with_lobes() {
     let whole = Effort { points: 128, samples: 500, directions: 50, cells: 300 };
     let plan =
