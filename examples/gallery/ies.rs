@@ -152,5 +152,7 @@ impl<'a> Numbers<'a> {
     }
 }
 
+// Named, as the fuzz target has this file under another root.
 #[cfg(test)]
+#[path = "ies/tests.rs"]
 mod tests;

@@ -5,6 +5,8 @@
 #[expect(dead_code, unused_imports, reason = "the gallery writes files, too")]
 #[path = "../../../examples/gallery/gltf/mod.rs"]
 mod gltf;
+#[path = "../../../examples/gallery/ies.rs"]
+mod ies;
 #[path = "../checks/reader.rs"]
 #[expect(dead_code, reason = "the other targets use the rest")]
 mod reader;
