@@ -262,13 +262,16 @@ fn histograms_over_triangles_are_the_probabilities_at_all_times() {
         (number, x, none, chi_square(&observed, &expected))
     });
     let limit = sidak(SIGNIFICANCE, found.len());
+    let (all, mut compared) = (found.len(), 0);
     for (number, x, none, (p, table)) in found {
         // Where parts of triangles are below the horizon, samples are fewer than choices: more than a few of them would be told
         // from chance.
         if none < 1e-4 * count as f64 {
             assert!(p >= limit, "{number} {x:?}: p {p}\n{table}");
+            compared += 1;
         }
     }
+    assert!(3 * compared >= all, "only {compared} histograms of {all} are compared");
 }
 
 /// A clip-mapped window that goes by, as a mesh or as an instance, under a sky with a sun.

@@ -61,8 +61,10 @@ fn bounds_hold_at_all_times_and_moments_are_means() {
         }
         let energy = f64::from(moments.energy);
         let size = f64::from(bounds.aabb.extent().length());
-        // Simpson's rule is off where the area goes down to almost nothing and up again.
-        assert!((energy - sum).abs() < 0.5 * sum, "{round}: {energy}, not {sum}");
+        // Every sixth moves a little. With the others, Simpson's rule is off where the area goes down to almost nothing
+        // and up again.
+        let granted = if round % 6 == 0 { 0.05 } else { 0.5 };
+        assert!((energy - sum).abs() < granted * sum, "{round}: {energy}, not {sum}");
         assert!(mean.length() < 1e-3 * size + 0.2 * f64::from(u8::from(round % 3 == 0)), "{round}: {mean}");
         assert!((f64::from(moments.variance) - square).abs() < 1e-2 * size * size + 0.05, "{round}: {square}");
         let normal = (vectors / energy).clamp_length_max(1.0);
