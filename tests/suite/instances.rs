@@ -262,12 +262,15 @@ fn histograms_over_triangles_are_the_probabilities() {
         (number, x, none, chi_square(&observed, &expected))
     });
     let limit = sidak(SIGNIFICANCE, found.len());
+    let (all, mut compared) = (found.len(), 0);
     for (number, x, none, (p, table)) in found {
         // Where parts of triangles are below the horizon, samples are fewer than choices.
         if none < 1e-3 * count as f64 {
             assert!(p >= limit, "{number} {x:?}: p {p}\n{table}");
+            compared += 1;
         }
     }
+    assert!(5 * compared >= all, "only {compared} histograms of {all} are compared");
 }
 
 /// Relative variance of the estimate at a point, without visibility.

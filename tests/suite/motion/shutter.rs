@@ -81,6 +81,17 @@ impl Moving {
         Self { start: self.start.first(count), end: self.end.first(count) }
     }
 
+    /// The same with lights that all have two sides.
+    pub(crate) fn two_sided(&self) -> Self {
+        let of = |town: &Town| {
+            let two_sided = |mesh: &LightMesh| LightMesh { two_sided: true, ..mesh.clone() };
+            let meshes = town.base.meshes.iter().map(two_sided).collect();
+            let objects = town.objects.iter().map(|parts| parts.iter().map(two_sided).collect()).collect();
+            Town::new(Scene { meshes, ..town.base.clone() }, objects, town.instances.clone())
+        };
+        Self { start: of(&self.start), end: of(&self.end) }
+    }
+
     pub(crate) fn instance(&self, number: usize) -> Instance {
         self.start.instance(number).moving_to(self.end.instances[number].1)
     }
