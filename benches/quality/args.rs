@@ -38,12 +38,12 @@ impl Effort {
         seconds: 8.0,
     };
     const QUICK: Self = Self {
-        points: 200,
-        samples: 512,
+        points: 80,
+        samples: 256,
         calls: 1 << 12,
         repeats: 3,
-        choices: 1_000_000,
-        study_points: 20,
+        choices: 250_000,
+        study_points: 8,
         repetitions: 64,
         images: 4,
         seconds: 0.5,

@@ -7,7 +7,7 @@ use crate::common::lights::{ARITIES, Point, build, sample_from_bytes, sample_spl
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LightMesh, Paint, Scene, Sky, random_point};
-use crate::common::tier::{some, tier};
+use crate::common::tier::{agreement, some, tier};
 use fanlight::{Arity, LightSample, Receiver, ShadingPoint, Splitting};
 use glam::Vec3;
 
@@ -120,8 +120,13 @@ fn examine(number: usize, samples: usize, every: usize, make: MakePoint) -> Coun
     counts
 }
 
-fn examine_all(scenes: usize, samples: usize, every: usize, make: MakePoint) {
+/// With so many samples of a scene in the full tier.
+fn examine_all(full: usize, make: MakePoint) {
     let mut all = Counts::default();
+    let scenes = tier().scenes;
+    let samples = agreement(scenes, full);
+    // Where there are many, directions would take most of the time.
+    let every = if samples > 25_000 { 10 } else { 2 };
     parallel::map(scenes, |i| examine(i, samples, every, make)).into_iter().for_each(|counts| all.add(counts));
     println!(
         "{} samples, {} of them None: {} mismatches, worst {:e}, {} not finite; {} directions: {} below the sample's \
@@ -138,39 +143,18 @@ fn examine_all(scenes: usize, samples: usize, every: usize, make: MakePoint) {
 /// Ten million of them in the full tier.
 #[test]
 fn samples_have_the_density_that_pdf_finds() {
-    let [scenes, samples] = tier().agreement;
-    examine_all(scenes, samples, 2, shading_point);
+    examine_all(25_000, shading_point);
 }
 
+/// Densities are those of other trees all the same: four million are enough in the full tier.
 #[test]
 fn samples_for_lobes_have_the_density_that_pdf_finds() {
-    let [scenes, samples] = tier().agreement;
-    // Densities are those of other trees all the same: four million are enough.
-    examine_all(scenes, samples * 2 / 5, 2, shading_point_with_lobe);
+    examine_all(10_000, shading_point_with_lobe);
 }
 
 #[test]
 fn samples_for_microfacets_have_the_density_that_pdf_finds() {
-    let [scenes, samples] = tier().agreement;
-    examine_all(scenes, samples / 25, 2, shading_point_with_microfacets);
-}
-
-#[test]
-#[ignore = "by hand: 10^8 samples take minutes; cargo test --release --test suite -- --ignored a_hundred_million"]
-fn a_hundred_million_samples_have_the_density_that_pdf_finds() {
-    examine_all(400, 250_000, 10, shading_point);
-}
-
-#[test]
-#[ignore = "by hand: 10^8 samples take minutes; cargo test --release --test suite -- --ignored a_hundred_million"]
-fn a_hundred_million_samples_for_lobes_have_the_density_that_pdf_finds() {
-    examine_all(400, 250_000, 10, shading_point_with_lobe);
-}
-
-#[test]
-#[ignore = "by hand: 10^8 samples take minutes; cargo test --release --test suite -- --ignored a_hundred_million"]
-fn a_hundred_million_samples_for_microfacets_have_the_density_that_pdf_finds() {
-    examine_all(400, 250_000, 10, shading_point_with_microfacets);
+    examine_all(1000, shading_point_with_microfacets);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LEAST_EFFORT, LOBES, MICROFACETS, Scene, point_of_kind, random_point};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
-use crate::common::tier::{few, fewer, some, tier};
+use crate::common::tier::{few, fewer, tier, two_of_five};
 use fanlight::{Arity, Hit, ShadingPoint, Splitting};
 use glam::Vec3;
 
@@ -97,7 +97,7 @@ fn contents() -> Vec<Content> {
 
 #[test]
 fn samples_fill_the_cells_of_triangles_as_the_density_says() {
-    check_cells(0, some);
+    check_cells(0, two_of_five);
 }
 
 #[test]

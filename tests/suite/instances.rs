@@ -9,7 +9,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{LightMesh, Paint, Scene, Sky, with_lobe};
 use crate::common::statistics::{Mean, chi_square, sidak};
-use crate::common::tier::{some, tier};
+use crate::common::tier::{agreement, some, tier};
 use fanlight::{
     Arity, Hit, Instance, InstanceId, LightSample, LightSampler, LightSamplerView, Mesh, ObjectId, PointSampler,
     Receiver, ShadingPoint, Splitting, Weight,
@@ -126,7 +126,8 @@ fn densities_agree() {
         let (town, mut pcg, number) = all[i].clone();
         let lights = town.build(ARITIES[number % 3]);
         let points = (0..10).map(|kind| point(&town, &mut pcg, kind)).collect::<Vec<_>>();
-        points.iter().map(|x| check_agreement(&lights.as_view(), x, &mut pcg, 10)).sum::<usize>()
+        let samples = agreement(10 * rounds.len(), 250);
+        points.iter().map(|x| check_agreement(&lights.as_view(), x, &mut pcg, samples)).sum::<usize>()
     });
     assert!(drawn.iter().sum::<usize>() > 30 * rounds.len(), "{drawn:?}");
 }

@@ -11,7 +11,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, Scene, with_lobe};
 use crate::common::statistics::{Mean, chi_square, sidak};
-use crate::common::tier::{some, tier};
+use crate::common::tier::{agreement, some, tier};
 use fanlight::{
     DiskLight, Emission, Error, Lamp, LightId, LightSample, LightSampler, LightSamplerView, Mesh, MeshId, MeshUpdate,
     PointLight, PointSampler, Receiver, SampledLight, ShadingPoint, Sides, SphereLight, Splitting, SpotLight,
@@ -227,7 +227,7 @@ fn densities_of_samples_are_found_again_in_mixed_scenes() {
             let x = ShadingPoint::new(2.0 * Vec3::from_array(pcg.cube()) - 0.5, receiver);
             let x = if i % 2 == 1 { with_lobe(x, &mut pcg, 1e-3) } else { x };
             let at = lights.at(&x);
-            for _ in 0..tier().agreement[1] / 20 {
+            for _ in 0..agreement(40 * count, 1250) {
                 let u = core::array::from_fn(|_| hostile(&mut pcg));
                 let Some(sample) = at.sample(u) else { continue };
                 match sample.light.id() {

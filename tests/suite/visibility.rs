@@ -5,7 +5,7 @@ use crate::common::lights::{ARITIES, aligned, build, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LightMesh, Scene, Sky, random_point};
-use crate::common::tier::{few, some, tier};
+use crate::common::tier::{agreement, few, some, tier};
 use fanlight::{
     Environment, Filter, LightSample, LightSampler, LightSamplerView, Mesh, SampledLight, ShadingPoint, Splitting,
     Visibility, VisibilityCounters, VisibilityLearner, VisibilityView,
@@ -94,7 +94,7 @@ fn examine(number: usize) {
             let make = if i % 2 == 0 { shading_point } else { shading_point_with_lobe };
             let x = if i < 4 { random_point(&mut pcg, i) } else { make(number + i, &scene, &mut pcg) };
             let at = view.at(&x);
-            for _ in 0..tier().agreement[1] / 200 {
+            for _ in 0..agreement(60 * 8 * HOSTILE.len(), 125) {
                 let u = core::array::from_fn(|_| hostile(&mut pcg));
                 queries.push((x, u));
                 let Some(sample) = at.sample(u) else { continue };

@@ -1,14 +1,20 @@
 //! How much the statistical tests do.
 //!
 //! `cargo test` does little of everything; `FANLIGHT_TIER=full cargo test --release --test suite -- --include-ignored`
-//! does what is behind the figures of the documentation. No tolerance depends on the tier.
+//! does what is behind the figures of the documentation. `FANLIGHT_TIER=long` draws 10^8 samples in each test that looks
+//! samples up again, which takes a quarter of an hour to hours a test: to be run by hand, with the names of tests. No
+//! tolerance depends on the tier.
 
 use std::sync::OnceLock;
 
 /// The sizes of one tier.
 pub(crate) struct Tier {
-    /// Scenes of which samples are looked up again, and samples of each.
-    pub(crate) agreement: [usize; 2],
+    /// Scenes of which samples are looked up again.
+    pub(crate) scenes: usize,
+    /// How many times fewer samples are looked up again than in the full tier.
+    agreement_divisor: usize,
+    /// Samples of a whole test that are looked up again at least.
+    agreement_least: usize,
     /// Shading points of a family of scenes whose irradiance is estimated.
     pub(crate) points: usize,
     /// Cases of a property.
@@ -29,7 +35,9 @@ pub(crate) struct Tier {
 
 /// Strides have no factor in common with the periods in which the families of scenes vary.
 const FULL: Tier = Tier {
-    agreement: [400, 25_000],
+    scenes: 400,
+    agreement_divisor: 1,
+    agreement_least: 0,
     points: 20,
     cases: 400,
     histogram: 100_000,
@@ -41,7 +49,9 @@ const FULL: Tier = Tier {
 };
 
 const THIN: Tier = Tier {
-    agreement: [200, 1000],
+    scenes: 200,
+    agreement_divisor: 25,
+    agreement_least: 0,
     points: 8,
     cases: 50,
     histogram: 30_000,
@@ -52,20 +62,33 @@ const THIN: Tier = Tier {
     tiles: &[16, 64],
 };
 
+const LONG: Tier = Tier { agreement_least: 100_000_000, ..FULL };
+
 /// The tier that the environment variable `FANLIGHT_TIER` asks for.
 pub(crate) fn tier() -> &'static Tier {
-    static IS_FULL: OnceLock<bool> = OnceLock::new();
-    let is_full = IS_FULL.get_or_init(|| match std::env::var("FANLIGHT_TIER").as_deref() {
-        Ok("full") => true,
-        Ok("thin") | Err(_) => false,
-        Ok(other) => panic!("FANLIGHT_TIER is `full` or `thin`, not `{other}`"),
-    });
-    if *is_full { &FULL } else { &THIN }
+    static TIER: OnceLock<&Tier> = OnceLock::new();
+    TIER.get_or_init(|| match std::env::var("FANLIGHT_TIER").as_deref() {
+        Ok("long") => &LONG,
+        Ok("full") => &FULL,
+        Ok("thin") | Err(_) => &THIN,
+        Ok(other) => panic!("FANLIGHT_TIER is `thin`, `full` or `long`, not `{other}`"),
+    })
+}
+
+/// Samples that are looked up again at each of so many points (or scenes), where the full tier draws `full`.
+pub(crate) fn agreement(points: usize, full: usize) -> usize {
+    (full / tier().agreement_divisor).max(tier().agreement_least.div_ceil(points))
 }
 
 /// Numbers below `count`: all of them, or one of so many.
 pub(crate) fn some(count: usize) -> Vec<usize> {
     (0..count).step_by(tier().stride).collect()
+}
+
+/// As [`some`], and two of five in the full tier, where each takes seconds. Five has no factor in common with the periods
+/// of the families either.
+pub(crate) fn two_of_five(count: usize) -> Vec<usize> {
+    if tier().stride > 1 { some(count) } else { (0..count).filter(|i| [0, 2].contains(&(i % 5))).collect() }
 }
 
 /// Numbers below `count`: one of several, or one of many, where another test looks at the same family.
