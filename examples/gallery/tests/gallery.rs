@@ -94,7 +94,7 @@ fn street() {
 /// The lights are copies of a lamp and of three windows.
 #[test]
 fn town() {
-    check("town", 1, [300, 60], 0.03);
+    check("town", 1, [200, 40], 0.05);
 }
 
 #[test]
