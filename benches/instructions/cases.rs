@@ -120,6 +120,9 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "street-moving-triangles/nee", calls: CALLS, run: || street(Street::MovingTriangles, true) },
     Case { name: "star-instance/nee", calls: CALLS, run: || star_instances(1) },
     Case { name: "star-10000-instances/nee", calls: CALLS, run: || star_instances(10_000) },
+    Case { name: "star-100-instances/nee", calls: CALLS, run: || star_instances(100) },
+    Case { name: "star-100-flattened/nee", calls: CALLS, run: || star_flattened(100) },
+    Case { name: "star-10000-flattened/nee", calls: CALLS, run: || star_flattened(10_000) },
 ];
 
 /// A point of a triangle that no workload has: its density costs what the first call at a shading point finds for all,
@@ -362,6 +365,15 @@ fn environment_light(call: fn(&LightSampler, &ShadingPoint, [f32; 3]) -> f32) {
 
 /// A clip-mapped window under the captured sky with its sun, or a wall of them: one object.
 fn star_instances(count: u32) {
+    star_wall(count, true);
+}
+
+/// The same with the windows as meshes of their own.
+fn star_flattened(count: u32) {
+    star_wall(count, false);
+}
+
+fn star_wall(count: u32, as_instances: bool) {
     let scene = scenes::scene("star");
     let points = lit_points(&scene, &lights(&scene));
     let mut builder =
@@ -372,12 +384,21 @@ fn star_instances(count: u32) {
     let weight = Weight::Texture(texture);
     let meshes: Vec<Mesh<'_>> =
         scene.meshes.iter().map(|m| Mesh::portal(&m.positions, &m.indices).uvs(&m.uvs).weight(weight)).collect();
-    let window = builder.add_object(&meshes).expect("the window is sound");
+    let window = as_instances.then(|| builder.add_object(&meshes).expect("the window is sound"));
     let row = f64::from(count).sqrt() as u32;
     for i in 0..count {
         let [x, z] = [i % row, i / row].map(|k| (k as f32 - (row / 2) as f32) * 2.0);
-        let place = Affine3A::from_translation(Vec3::new(x, 0.0, z));
-        builder.add_instance(Instance::new(window, place)).expect("the place is sound");
+        let place = Vec3::new(x, 0.0, z);
+        if let Some(window) = window {
+            let instance = Instance::new(window, Affine3A::from_translation(place));
+            builder.add_instance(instance).expect("the place is sound");
+            continue;
+        }
+        for mesh in &scene.meshes {
+            let placed: Vec<Vec3> = mesh.positions.iter().map(|p| *p + place).collect();
+            let mesh = Mesh::portal(&placed, &mesh.indices).uvs(&mesh.uvs).weight(weight);
+            builder.add_mesh(&mesh).expect("the window is sound");
+        }
     }
     let lights = builder.build().expect("the wall is small");
     let numbers = numbers();

@@ -12,6 +12,6 @@ pub(crate) use aabb::Aabb;
 pub(crate) use cone::{Cone, angle};
 pub(crate) use horizon::{HORIZON_ROUNDING, horizon, is_below};
 pub(crate) use motion::{area_vectors, between, cofactors, determinants};
-pub(crate) use placement::{Placement, norm};
+pub(crate) use placement::{ForwardMap, Placement, norm};
 pub(crate) use polygon::Polygon;
 pub(crate) use triangle::{Triangle, cross_plane, intersect, normal_and_area, subdivision_centers};

@@ -27,6 +27,23 @@ pub(crate) struct Placement {
     pub(crate) determinant: f64,
 }
 
+/// The way from an object's own space to the world alone, without the way back.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ForwardMap {
+    pub(crate) linear: DMat3,
+    translation: DVec3,
+    /// Whether the map is a mirror image, so that vertices run around a triangle's front the other way.
+    pub(crate) is_mirrored: bool,
+}
+
+impl ForwardMap {
+    /// Returns a point in the world, relative to another point there.
+    #[inline]
+    pub(crate) fn relative_to(&self, origin: Vec3, point: Vec3) -> DVec3 {
+        self.linear * point.as_dvec3() + (self.translation - origin.as_dvec3())
+    }
+}
+
 impl Placement {
     /// Returns the map of these columns: three axes, and the image of the origin. They must be invertible.
     #[inline]
@@ -57,10 +74,16 @@ impl Placement {
         Self { linear, inverse, translation, determinant }
     }
 
+    /// Returns the way to the world alone.
+    #[inline(always)]
+    pub(crate) fn forward(&self) -> ForwardMap {
+        ForwardMap { linear: self.linear, translation: self.translation, is_mirrored: self.is_mirrored() }
+    }
+
     /// Returns a point in the world, relative to another point there.
     #[inline]
     pub(crate) fn relative_to(&self, origin: Vec3, point: Vec3) -> DVec3 {
-        self.linear * point.as_dvec3() + (self.translation - origin.as_dvec3())
+        self.forward().relative_to(origin, point)
     }
 
     /// Returns a point of the world in the object's space.

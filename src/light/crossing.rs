@@ -18,11 +18,11 @@ use crate::math::sqrt64;
 /// recognized.
 const MAX_PLANES: usize = 64;
 
-/// Most triangles of instances that are looked at one by one. *Chosen*: the windows of a large house.
+/// Most triangles that are looked at where some belong to instances. *Chosen*: a wall of 10,000 windows, several times.
 ///
-/// Larger: builds and refits of scenes of many instances take longer. Smaller: rooms with more windows are not
-/// recognized.
-const MOST_PLACED: usize = 4096;
+/// Larger: builds and refits of walls of many instances take longer; lights in more than [`MAX_PLANES`] planes are soon
+/// found to be. Smaller: walls with more windows are not recognized.
+const MOST_PLACED: usize = 1 << 16;
 
 /// Largest distance of a vertex from a plane that it counts as lying in, relative to the coordinates of both. *Chosen*:
 /// rounding to `f32` moves a vertex by at most 1.04e-7 of them (√3 · 2⁻²⁴). A ray that meets two lights of what counts
@@ -103,8 +103,9 @@ impl Lights {
 
     /// Whether a ray meets at most one of lights among which are lamps or instances.
     fn is_mixture_crossed_once(&self) -> bool {
-        let mut triangles = Vec::new();
+        let (mut triangles, mut planes) = (Vec::new(), Planes::default());
         for record in &self.records {
+            let first = triangles.len();
             match Light::of(record, Extras::NONE, &self.instances, 0.0) {
                 Light::Triangle(triangle) => triangles.push(*triangle),
                 Light::Lamp(lamp) if lamp.record.has_extent() => return false,
@@ -117,26 +118,47 @@ impl Lights {
                     triangles.extend(placed.flattened());
                 }
             }
+            if !triangles[first..].iter().all(|triangle| planes.add(triangle)) {
+                return false;
+            }
         }
-        is_crossed_once(&triangles)
+        planes.are_crossed_once(&triangles)
     }
 }
 
 /// Whether a ray meets at most one light that shines back along it, as far as the recognized arrangements go.
 fn is_crossed_once(lights: &[LightTriangle]) -> bool {
-    let mut planes: Vec<Plane> = Vec::new();
-    let mut members = Vec::new();
-    for light in lights {
+    let mut planes = Planes::default();
+    lights.iter().all(|light| planes.add(light)) && planes.are_crossed_once(lights)
+}
+
+/// Planes that lights lie in.
+#[derive(Default)]
+struct Planes {
+    planes: Vec<Plane>,
+    /// The plane of each light.
+    numbers: Vec<usize>,
+}
+
+impl Planes {
+    /// Adds a light. Returns whether it has a plane, among no more than there may be.
+    fn add(&mut self, light: &LightTriangle) -> bool {
         let Some(own) = Plane::new(light) else { return false };
-        let number = planes.iter().position(|plane| plane.holds(light)).unwrap_or(planes.len());
-        members.push((number, light));
-        match planes.get_mut(number) {
+        let number = self.planes.iter().position(|plane| plane.holds(light)).unwrap_or(self.planes.len());
+        self.numbers.push(number);
+        match self.planes.get_mut(number) {
             Some(plane) => plane.is_two_sided |= own.is_two_sided || plane.normal.dot(own.normal) < 0.0,
             None if number == MAX_PLANES => return false,
-            None => planes.push(own),
+            None => self.planes.push(own),
         }
+        true
     }
-    is_convex(&planes, lights) && are_apart(&planes, members)
+
+    /// Whether a ray meets at most one of all lights that were added.
+    fn are_crossed_once(self, lights: &[LightTriangle]) -> bool {
+        let members = self.numbers.into_iter().zip(lights).collect();
+        is_convex(&self.planes, lights) && are_apart(&self.planes, members)
+    }
 }
 
 /// Whether all lights face into one convex body, or lie in one plane.

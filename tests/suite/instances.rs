@@ -17,6 +17,7 @@ use fanlight::{
 use glam::{Affine3A, Mat3, Vec3};
 
 pub(crate) mod town;
+mod wall;
 
 use town::{KINDS, Town, moved};
 

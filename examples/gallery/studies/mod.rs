@@ -6,6 +6,7 @@ mod letters;
 mod neon;
 mod nested;
 mod street;
+mod town;
 
 use crate::render::{Error, Model, Techniques, World};
 use crate::report::{Comparison, Contestant, Effort, Role, compare};
@@ -19,6 +20,7 @@ pub(crate) fn study(scene: &Scene, model: &Model, effort: Effort) -> Result<Comp
         "nested" => nested::study(model, effort),
         "neon" => neon::study(model, effort),
         "street" => street::study(model, scene.bounces, effort),
+        "town" => town::study(model, scene.bounces, effort),
         name => without_and_with(name, model, scene.bounces, effort),
     }
 }

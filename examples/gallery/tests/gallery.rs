@@ -91,6 +91,12 @@ fn street() {
     check("street", 2, [1500, 150], 0.03);
 }
 
+/// The lights are copies of a lamp and of three windows.
+#[test]
+fn town() {
+    check("town", 1, [200, 40], 0.05);
+}
+
 #[test]
 fn street_in_fog() {
     let without = |model: &render::Model| Techniques::without(model).expect("lights");

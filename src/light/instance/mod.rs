@@ -259,7 +259,7 @@ impl<'a> PlacedObject<'a> {
     /// Returns one of the object's triangles in its place.
     #[inline]
     pub(crate) fn triangle(&self, below: u32) -> PlacedTriangle<'a> {
-        PlacedTriangle::new(&self.object.records()[below as usize], self.placement())
+        PlacedTriangle::new(&self.object.records()[below as usize], self.placement().forward())
     }
 }
 

@@ -5,7 +5,7 @@ use core::f32::consts::PI;
 use glam::{DVec3, Vec3};
 
 use crate::blas::Lattice;
-use crate::geometry::{self, Placement};
+use crate::geometry::{self, ForwardMap};
 use crate::light::{LightKind, LightTriangle, LocalPoint};
 use crate::math;
 use crate::receiver::{ReceiverKind, ShadingPoint};
@@ -15,24 +15,25 @@ use crate::receiver::{ReceiverKind, ShadingPoint};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlacedTriangle<'a> {
     pub(in crate::light) record: &'a LightTriangle,
-    placement: Placement,
+    map: ForwardMap,
 }
 
 impl<'a> PlacedTriangle<'a> {
-    pub(super) fn new(record: &'a LightTriangle, placement: Placement) -> Self {
-        Self { record, placement }
+    #[inline(always)]
+    pub(super) fn new(record: &'a LightTriangle, map: ForwardMap) -> Self {
+        Self { record, map }
     }
 
     /// Returns the vertices relative to a point of the world, in the object's own order.
     pub(in crate::light) fn exactly_relative_to(&self, point: Vec3) -> [DVec3; 3] {
-        self.record.triangle().0.map(|vertex| self.placement.relative_to(point, vertex))
+        self.record.triangle().0.map(|vertex| self.map.relative_to(point, vertex))
     }
 
     /// Returns the normal of the front side times twice the area.
     pub(in crate::light) fn double_area_vector(&self) -> DVec3 {
         let [a, b, c] = self.record.triangle().0.map(Vec3::as_dvec3);
-        let cross = (self.placement.linear * (b - a)).cross(self.placement.linear * (c - a));
-        if self.placement.is_mirrored() { -cross } else { cross }
+        let cross = (self.map.linear * (b - a)).cross(self.map.linear * (c - a));
+        if self.map.is_mirrored { -cross } else { cross }
     }
 
     /// Returns the unit normal of the front side and the area, or `None` where the area is zero.
@@ -43,7 +44,7 @@ impl<'a> PlacedTriangle<'a> {
 
     /// Whether vertices run around the front the other way.
     pub(in crate::light) fn is_mirrored(&self) -> bool {
-        self.placement.is_mirrored()
+        self.map.is_mirrored
     }
 
     /// Whether the environment shines in through the triangle.

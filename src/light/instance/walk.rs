@@ -45,7 +45,7 @@ pub(crate) struct ObjectWalk<'a> {
     margin: f32,
     /// Whether weights in the object's space are those in the world.
     is_simple: bool,
-    /// Largest factor by which the map lengthens.
+    /// Largest factor by which the map lengthens; 0 where portals show the same in all directions.
     largest: f32,
     /// What portals show; `None` for unit radiance.
     environment: Option<&'a EnvironmentView<'a>>,
@@ -82,6 +82,7 @@ impl<'a> ObjectWalk<'a> {
         let (placement, parts) = (placed.placement(), placed.object.parts());
         let (receiver, normal_length) = own_receiver(x.receiver, &placement.linear);
         let (position, margin) = own_position(&placement, x.position);
+        let shows_an_image = environment.is_some_and(|environment| !environment.is_constant());
         Some(Self {
             tree: parts.tree,
             records: parts.records,
@@ -91,7 +92,7 @@ impl<'a> ObjectWalk<'a> {
             normal_length,
             margin,
             is_simple: !x.receiver.has_lobe() && placement.is_similarity(),
-            largest: norm(&placement.linear) as f32,
+            largest: if shows_an_image { norm(&placement.linear) as f32 } else { 0.0 },
             placement,
             environment,
         })
@@ -132,7 +133,7 @@ impl<'a> ObjectWalk<'a> {
     }
 
     fn triangle(&self, below: u32) -> PlacedTriangle<'a> {
-        PlacedTriangle::new(&self.records[below as usize], self.placement)
+        PlacedTriangle::new(&self.records[below as usize], self.placement.forward())
     }
 }
 

@@ -71,6 +71,7 @@ impl<'a> FeatureView<'a> {
     }
 
     /// The directions in which a cell is visible.
+    #[inline(always)]
     fn opening(&self, cell: LatticeCell) -> Opening {
         Opening::new(self.environment, cell.corners().map(|corner| self.triangle.position(corner)))
     }

@@ -129,6 +129,7 @@ const DIRECTION_VARIANCE_SHARE: f32 = 0.5;
 const DISTANCE_VARIANCE_SHARE: f32 = 0.3;
 
 /// Weights of a node's children before the oracle was asked anything.
+#[derive(Clone, Copy)]
 pub(super) struct Estimates<const N: usize> {
     /// Zero where nothing can arrive.
     pub(super) weights: [f32; N],
@@ -185,7 +186,7 @@ impl<const N: usize> WideTree<'_, N> {
 impl<const N: usize> Node<N> {
     /// Estimates all lanes, and asks the oracle about what is in doubt and what portals show.
     #[inline(always)]
-    fn asked(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> Estimates<N> {
+    pub(super) fn asked(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> Estimates<N> {
         let mut estimates = self.estimates(x);
         if oracle.has_shaped_leaves() {
             // By value: what is referred to is kept in memory.

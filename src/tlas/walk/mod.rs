@@ -7,6 +7,7 @@ mod beam;
 pub(in crate::tlas) mod descend;
 mod groups;
 mod importance;
+mod kept;
 mod learned;
 pub(in crate::tlas) mod ray;
 mod segment;

@@ -4,13 +4,14 @@
 use super::FirstWeights;
 use super::descend::NodeWeights;
 use super::importance::LeafOracle;
+use super::kept::KeepingWalk;
 use super::ray::{Crossed, Met};
 use crate::receiver::{Lobe, for_lobe};
 use crate::simd::InstructionSet;
 use crate::tlas::arity::Arity;
-use crate::tlas::node::{Child, Node};
+use crate::tlas::node::Node;
 use crate::tlas::tree::{TlasView, WideTree, for_arity};
-use crate::warp::{Variate, pick_wide, pmf_wide};
+use crate::warp::{Variate, pmf_wide};
 use glam::Vec3;
 
 impl TlasView<'_> {
@@ -70,20 +71,7 @@ impl<const N: usize> WideTree<'_, N> {
         if self.nodes.is_empty() {
             return self.single_leaf(oracle).then_some((0, 1.0));
         }
-        let (mut node, mut pmf) = (0, 1.0);
-        loop {
-            let weights = match first {
-                Some(weights) if node == 0 => weights.lanes(),
-                _ => self.weigh_by(node, oracle, lobe),
-            };
-            let (lane, share) = pick_wide(&weights, u)?;
-            pmf *= share;
-            match self.nodes[node].child(lane) {
-                Child::Node(index) => node = index as usize,
-                Child::Leaf(leaf) => return Some((leaf, pmf)),
-                Child::Empty => return None,
-            }
-        }
+        InstructionSet::best().run(KeepingWalk { tlas: self, oracle, lobe, first, u })
     }
 
     fn pmf_by(&self, leaf: u32, oracle: &impl LeafOracle, lobe: impl Lobe) -> f64 {
