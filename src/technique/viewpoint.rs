@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use glam::Vec3;
 
 use crate::env::{EnvironmentView, RegionMoments};
-use crate::light::{LightKind, LightLeaf, LightPoint, LightView, LightsView};
+use crate::light::{FewTriangles, LightKind, LightLeaf, LightPoint, LightView, LightsView};
 use crate::math::{at_least, only_if};
 use crate::receiver::ShadingPoint;
 use crate::tlas::{FactorBytes, LeafOracle, TlasView};
@@ -94,6 +94,13 @@ impl Viewpoint<'_> {
             return None;
         }
         self.scene.lights.view(leaf, &self.x, self.scene.directional_environment())
+    }
+
+    /// Returns the lights if they are few triangles, which need no tree.
+    #[inline(always)]
+    pub(crate) fn few(&self) -> Option<FewTriangles<'_>> {
+        let few = FewTriangles::new(&self.scene.lights, &self.x)?;
+        (self.scene.sky.is_none() && self.visibility.is_none() && self.is_somewhere()).then_some(few)
     }
 
     /// Estimates the irradiance from all that is infinitely far away and needs no portal: the same at all places.
