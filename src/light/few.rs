@@ -18,12 +18,14 @@
 //! The pass decides by the shading point alone whether this is good enough, so that samples and densities agree. Where
 //! it is not, the tree is asked.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use super::{LightTriangle, LightsView};
+use super::triangle_view::FARTHEST_POINT;
+use super::{Illumination, LightTriangle, LightsView};
 use crate::blas::{LEAF, Lattice};
-use crate::math::{limit, sqrt64};
+use crate::math::{at_least, at_most, limit, sqrt64};
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
+use crate::record::{Hit, LightSample, SampledLight};
 use crate::simd::{InstructionSet, Kernel};
 use crate::warp::seed;
 use crate::warp::triangle::square_to_triangle;
@@ -55,27 +57,6 @@ const ALMOST_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 pub(crate) struct FewTriangles<'a> {
     lights: &'a LightsView<'a>,
     x: &'a ShadingPoint,
-    normal: Vec3,
-}
-
-/// A point that was drawn on one of a few triangles, with all that a sample tells of it.
-pub(crate) struct FewPoint {
-    /// Leaf of the triangle.
-    pub(crate) leaf: u32,
-    pub(crate) point: Lattice,
-    /// Relative to the shading point.
-    pub(crate) relative: DVec3,
-    /// Unit direction.
-    pub(crate) direction: Vec3,
-    pub(crate) distance: f64,
-    /// Unit normal of the front side.
-    pub(crate) normal: Vec3,
-    /// Per solid angle.
-    pub(crate) pdf: f64,
-    /// Per area.
-    pub(crate) pdf_area: f64,
-    /// Probability of the triangle.
-    pub(crate) pmf: f64,
 }
 
 /// What the pass finds out, by lanes: one for each triangle.
@@ -96,26 +77,27 @@ impl<'a> FewTriangles<'a> {
     /// point is no surface without a lobe.
     #[inline(always)]
     pub(crate) fn new(lights: &'a LightsView<'a>, x: &'a ShadingPoint) -> Option<Self> {
-        if lights.len() > MOST_FEW {
-            return None;
-        }
-        let Receiver::Surface(normal) = x.receiver else { return None };
-        let is_other = lights.has_portals
+        let is_surface = matches!(x.receiver, Receiver::Surface(_));
+        let [px, py, pz] = x.position.to_array().map(f32::abs);
+        let is_other = !is_surface
+            | (lights.len() > MOST_FEW)
+            | lights.has_portals
             | lights.has_lamps
             | lights.is_edited
             | !(lights.extras.is_empty() & lights.instances.is_empty())
             | (x.groups == 0)
-            | (lights.illumination as u32 != 0);
-        (!is_other).then_some(Self { lights, x, normal })
+            | !((px <= FARTHEST_POINT) & (py <= FARTHEST_POINT) & (pz <= FARTHEST_POINT))
+            | (lights.illumination != Illumination::ClampedVertices);
+        if is_other { None } else { Some(Self { lights, x }) }
     }
 
-    /// Draws a point and passes it on; `Some(None)` where nothing arrives. `None` where the tree has to be asked.
+    /// Draws a point; `Some(None)` where nothing arrives. `None` where the tree has to be asked.
     #[inline]
-    pub(crate) fn sample<R>(&self, u: [f32; 3], then: impl FnOnce(&FewPoint) -> R) -> Option<Option<R>> {
+    pub(crate) fn sample(&self, u: [f32; 3]) -> Option<Option<LightSample>> {
         if self.lights.len() <= LEAST_LANES {
-            InstructionSet::best().run(SampleFew::<LEAST_LANES, _> { few: self, u, then })
+            InstructionSet::best().run(SampleFew::<LEAST_LANES> { few: self, u })
         } else {
-            InstructionSet::best().run(SampleFew::<MOST_FEW, _> { few: self, u, then })
+            InstructionSet::best().run(SampleFew::<MOST_FEW> { few: self, u })
         }
     }
 
@@ -153,7 +135,7 @@ impl<'a> FewTriangles<'a> {
         if !self.lights.scales.is_empty() {
             self.scale(&mut weights_of_records);
         }
-        let (origin, normal) = (self.x.position.as_dvec3(), self.normal.as_dvec3());
+        let (origin, normal) = (self.x.position.as_dvec3(), self.x.receiver.normal().as_dvec3());
         let [mut w0, mut w1, mut w2] = [[0.0; N]; 3];
         let [mut nx, mut ny, mut nz] = [[0.0; N]; 3];
         let [mut radiances, mut strengths, mut weights] = [[0.0; N]; 3];
@@ -207,18 +189,17 @@ impl<'a> FewTriangles<'a> {
 }
 
 /// Draws a point.
-struct SampleFew<'f, const N: usize, T> {
+struct SampleFew<'f, const N: usize> {
     few: &'f FewTriangles<'f>,
     u: [f32; 3],
-    then: T,
 }
 
-impl<R, const N: usize, T: FnOnce(&FewPoint) -> R> Kernel for SampleFew<'_, N, T> {
-    type Output = Option<Option<R>>;
+impl<const N: usize> Kernel for SampleFew<'_, N> {
+    type Output = Option<Option<LightSample>>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
-        let Self { few, u, then } = self;
+        let Self { few, u: [choice, u, v] } = self;
         let faces: Faces<N> = few.weigh()?;
         let mut ends = [0.0; N];
         let mut total = 0.0;
@@ -231,9 +212,8 @@ impl<R, const N: usize, T: FnOnce(&FewPoint) -> R> Kernel for SampleFew<'_, N, T
             return Some(None);
         }
         // What a choice needs below 2⁻²⁴ is a hash of the other numbers.
-        let [choice, u, v] = u.map(|u| f64::from(limit(u, ALMOST_ONE)));
-        let low = seed(&self.u[1..]) >> 11;
-        let target = (choice + low as f64 * LOW_STEP) * total;
+        let low = (seed(&[u, v]) >> 11) as f64;
+        let target = (f64::from(limit(choice, ALMOST_ONE)) + low * LOW_STEP) * total;
         let (mut lane, mut start) = (0, 0.0);
         for end in ends {
             // Never past the last positive weight.
@@ -243,26 +223,33 @@ impl<R, const N: usize, T: FnOnce(&FewPoint) -> R> Kernel for SampleFew<'_, N, T
         }
         let lane = lane % N;
         let (face, record) = (faces.face(lane), few.lights.records.get(lane)?);
-        let point = face.turned(Lattice::inside(square_to_triangle([u, v])), target - start);
-        let [a, b, c] = record.triangle().exactly_relative_to(few.x.position);
+        // Numbers outside of the unit interval, and NaN, end at the rim.
+        let point = Lattice::inside(square_to_triangle([u.into(), v.into()]));
+        let point = face.turned(point, target - start);
+        let (triangle, origin) = (record.triangle(), few.x.position.as_dvec3());
+        let [a, b, c] = triangle.0.map(|vertex| vertex.as_dvec3() - origin);
         let [b0, b1, b2] = shares(point);
         let relative = a * b0 + b * b1 + c * b2;
         let distance2 = relative.length_squared();
         let distance = sqrt64(distance2);
-        let inverse = 1.0 / sqrt64(face.normal.length_squared());
-        let per_strength = 6.0 * face.mean([b0, b1, b2]) / total;
-        let drawn = FewPoint {
-            leaf: lane as u32,
-            point,
-            relative,
+        let inverse_length = 1.0 / sqrt64(face.normal.length_squared());
+        let inverse_total = 1.0 / total;
+        let per_strength = 6.0 * face.mean([b0, b1, b2]) * inverse_total;
+        let pdf = per_strength * face.radiance * (distance2 * distance);
+        let is_positive = pdf > 0.0 && pdf < f64::INFINITY;
+        if !is_positive {
+            return Some(None);
+        }
+        Some(Some(LightSample {
+            light: SampledLight::Triangle(Hit::new(few.lights.id(record), point.to_barycentrics())),
+            position: (origin + relative).as_vec3(),
+            normal: (face.normal * inverse_length).as_vec3(),
             direction: (relative * (1.0 / distance)).as_vec3(),
-            distance,
-            normal: (face.normal * inverse).as_vec3(),
-            pdf: per_strength * face.radiance * (distance2 * distance),
-            pdf_area: per_strength * face.strength * inverse,
-            pmf: faces.weights[lane] / total,
-        };
-        Some((drawn.pdf > 0.0 && drawn.pdf < f64::INFINITY).then(|| then(&drawn)))
+            distance: distance as f32,
+            pdf: positive(pdf),
+            pdf_area: positive(per_strength * face.strength * inverse_length),
+            pmf: positive(faces.weights[lane] * inverse_total),
+        }))
     }
 }
 
@@ -292,9 +279,10 @@ impl<const N: usize> Kernel for DensityOfFew<'_, N> {
         let [a, b, c] = record.triangle().exactly_relative_to(few.x.position);
         let [b0, b1, b2] = shares(point);
         let distance2 = (a * b0 + b * b1 + c * b2).length_squared();
-        let per_strength = 6.0 * face.mean([b0, b1, b2]) / total;
+        let inverse_total = 1.0 / total;
+        let per_strength = 6.0 * face.mean([b0, b1, b2]) * inverse_total;
         let pdf = per_strength * face.radiance * (distance2 * sqrt64(distance2));
-        Some([faces.weights[lane] / total, if pdf < f64::INFINITY { pdf } else { 0.0 }])
+        Some([faces.weights[lane] * inverse_total, if pdf < f64::INFINITY { pdf } else { 0.0 }])
     }
 }
 
@@ -356,6 +344,12 @@ const LOW_STEP: f64 = 1.0 / (16_777_216.0 * 9_007_199_254_740_992.0);
 fn shares(point: Lattice) -> [f64; 3] {
     let [b1, b2] = point.to_barycentrics().map(f64::from);
     [1.0 - b1 - b2, b1, b2]
+}
+
+/// Returns a positive density in single precision.
+#[inline(always)]
+fn positive(pdf: f64) -> f32 {
+    at_most(at_least(pdf as f32, f32::MIN_POSITIVE), f32::MAX)
 }
 
 /// The smaller of both: a single instruction, unlike `f64::min`.

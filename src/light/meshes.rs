@@ -2,6 +2,7 @@
 
 /// Returns the mesh that holds a triangle, by the numbers at which the meshes start (and, at last, the one at which
 /// they end).
+#[inline]
 pub(super) fn mesh_of(starts: &[u32], index: u32) -> usize {
     let last = starts.len().saturating_sub(2);
     if last == 0 {

@@ -47,7 +47,7 @@ pub(crate) use edit::{EditState, Edited, LightChanges, Unplaced, laid_out};
 pub(crate) use emitted::{EmissionStart, EmittedRay};
 pub(crate) use energy::{Energies, storable};
 pub(crate) use extras::Extras;
-pub(crate) use few::{FewPoint, FewTriangles, MOST_FEW};
+pub(crate) use few::{FewTriangles, MOST_FEW};
 pub use illumination::Illumination;
 pub use instance::Instance;
 pub(crate) use instance::{ObjectWalk, PlacedObject, PlacedTriangle};
@@ -518,12 +518,6 @@ impl<'a> LightsView<'a> {
         lamp.record
             .has_extent()
             .then(|| LightPoint { leaf: LightLeaf::alone(leaf), point: LocalPoint::from_direction(direction) })
-    }
-
-    /// Returns the triangle in a leaf.
-    #[inline(always)]
-    pub(crate) fn id_of_leaf(&self, leaf: u32) -> TriangleId {
-        self.id(&self.records[leaf as usize])
     }
 
     fn id(&self, triangle: &LightTriangle) -> TriangleId {

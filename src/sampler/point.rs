@@ -5,8 +5,7 @@ use core::cell::{Ref, RefCell};
 use glam::Vec3;
 
 use super::finite::{to_finite, to_positive};
-use crate::blas::Lattice;
-use crate::light::{FewPoint, LightLeaf, LightPoint, LightView, LightViewKind};
+use crate::light::{LightLeaf, LightPoint, LightView, LightViewKind};
 use crate::receiver::ShadingPoint;
 use crate::record::{Hit, InstanceId, LightId, LightSample, SampledLight, TriangleId};
 use crate::technique::{DistantDirection, Drawn, Mixed, Mixture, SkyDirection, Variates, Viewpoint};
@@ -67,8 +66,8 @@ impl<'a> PointSampler<'a> {
     /// sample of zero. The densities of all points integrate to the probability of not getting `None`.
     #[must_use]
     pub fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
-        if let Some(few) = self.at.few() {
-            if let Some(sample) = few.sample(u, |drawn| few_sample(&self.at, drawn)) {
+        if self.at.has_few() {
+            if let Some(sample) = self.at.sample_few(u) {
                 return sample;
             }
         }
@@ -135,9 +134,9 @@ impl<'a> PointSampler<'a> {
     /// Where a ray can cross several portals, what a host needs is [`Self::pdf_direction`].
     #[must_use]
     pub fn pdf(&self, hit: &Hit) -> f32 {
-        if let Some(few) = self.at.few() {
+        if self.at.has_few() {
             let Some(leaf) = self.at.scene.lights.leaf_of_hit(hit) else { return 0.0 };
-            if let Some([_, pdf]) = few.density(leaf.top, Lattice::from_barycentrics(hit.barycentrics)) {
+            if let Some([_, pdf]) = self.at.density_of_few(leaf, LightPoint::new(leaf, hit.barycentrics).point) {
                 return to_finite(pdf);
             }
         }
@@ -398,19 +397,4 @@ fn light_sample(at: &Viewpoint<'_>, drawn: &Drawn, view: &LightView<'_>) -> Opti
         pdf_area: to_positive(drawn.pdf * view.solid_angle_per_area(relative)),
         pmf: to_positive(drawn.pmf),
     })
-}
-
-/// The same of a point of one of a few triangles.
-#[inline(always)]
-fn few_sample(at: &Viewpoint<'_>, drawn: &FewPoint) -> LightSample {
-    LightSample {
-        light: SampledLight::Triangle(Hit::new(at.scene.lights.id_of_leaf(drawn.leaf), drawn.point.to_barycentrics())),
-        position: (at.x.position.as_dvec3() + drawn.relative).as_vec3(),
-        normal: drawn.normal,
-        direction: drawn.direction,
-        distance: drawn.distance as f32,
-        pdf: to_positive(drawn.pdf),
-        pdf_area: to_positive(drawn.pdf_area),
-        pmf: to_positive(drawn.pmf),
-    }
 }

@@ -18,24 +18,21 @@ pub(crate) struct Trees<'t> {
 impl Trees<'_> {
     /// Returns the probability of a light, or the expected number of visits if the tree is split.
     pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: LightLeaf) -> f64 {
-        if let Some([pmf, _]) = self.density_of_few(at, leaf, LocalPoint::NONE) {
-            return pmf;
+        if self.splitting.is_none() && at.has_few() {
+            if let Some([pmf, _]) = at.density_of_few(leaf, LocalPoint::NONE) {
+                return pmf;
+            }
         }
+        self.pmf_of_tree(at, leaf)
+    }
+
+    /// Returns the same by walks through the tree.
+    fn pmf_of_tree(&self, at: &Viewpoint<'_>, leaf: LightLeaf) -> f64 {
         let pmf = match self.splitting {
             None => at.scene.tlas.pmf(leaf.top, at, self.first),
             Some(splitting) => at.scene.tlas.expected_count(leaf.top, at, splitting),
         };
         pmf * at.pmf_within(leaf)
-    }
-
-    /// Returns the probability of a light and the density of a point of it, where the lights are few triangles and no
-    /// tree is walked.
-    #[inline(always)]
-    fn density_of_few(&self, at: &Viewpoint<'_>, leaf: LightLeaf, point: LocalPoint) -> Option<[f64; 2]> {
-        if self.splitting.is_some() {
-            return None;
-        }
-        at.few()?.density(leaf.top, point.lattice())
     }
 
     /// Draws a point on a light that has been chosen with this probability, or is visited this many times.
@@ -74,10 +71,12 @@ impl Technique for Trees<'_> {
     }
 
     fn density(&self, at: &Viewpoint<'_>, LightPoint { leaf, point }: LightPoint, view: &LightView<'_>) -> Density {
-        if let Some([pmf, pdf]) = self.density_of_few(at, leaf, point) {
-            return Density { pmf, pdf };
+        if self.splitting.is_none() && at.has_few() {
+            if let Some([pmf, pdf]) = at.density_of_few(leaf, point) {
+                return Density { pmf, pdf };
+            }
         }
-        match self.pmf(at, leaf) {
+        match self.pmf_of_tree(at, leaf) {
             0.0 => Density { pmf: 0.0, pdf: 0.0 },
             pmf => Density { pmf, pdf: pmf * view.pdf(point).unwrap_or(0.0) },
         }
