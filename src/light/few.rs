@@ -22,7 +22,7 @@ use glam::DVec3;
 
 use super::triangle_view::FARTHEST_POINT;
 use super::{Illumination, LightTriangle, LightsView};
-use crate::blas::{LEAF, Lattice};
+use crate::blas::Lattice;
 use crate::math::{at_least, at_most, limit, sqrt64};
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::record::{Hit, LightSample, SampledLight};
@@ -83,6 +83,7 @@ impl<'a> FewTriangles<'a> {
             | (lights.len() > MOST_FEW)
             | lights.has_portals
             | lights.has_lamps
+            | !lights.cells.is_empty()
             | lights.is_edited
             | !(lights.extras.is_empty() & lights.instances.is_empty())
             | (x.groups == 0)
@@ -120,17 +121,13 @@ impl<'a> FewTriangles<'a> {
         let [mut ax, mut ay, mut az] = [[0.0_f32; N]; 3];
         let [mut bx, mut by, mut bz] = [[0.0_f32; N]; 3];
         let [mut cx, mut cy, mut cz] = [[0.0_f32; N]; 3];
-        let (mut weights_of_records, mut flags, mut is_textured) = ([0.0_f32; N], [0_u32; N], false);
+        let (mut weights_of_records, mut flags) = ([0.0_f32; N], [0_u32; N]);
         for i in 0..N {
             // Lanes beyond the last triangle repeat the first one, with no radiance.
             let (record, share) = records.get(i).map_or((first, 0.0), |record| (record, 1.0));
             let [a, b, c] = &record.vertices;
             ([ax[i], ay[i], az[i]], [bx[i], by[i], bz[i]], [cx[i], cy[i], cz[i]]) = (*a, *b, *c);
             (weights_of_records[i], flags[i]) = (share * record.root.average, record.index_and_flags);
-            is_textured |= record.root.node != LEAF;
-        }
-        if is_textured {
-            return None;
         }
         if !self.lights.scales.is_empty() {
             self.scale(&mut weights_of_records);

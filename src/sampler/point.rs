@@ -60,7 +60,8 @@ impl<'a> PointSampler<'a> {
     }
 
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the
-    /// point on it, so that stratified pairs stay stratified.
+    /// point on it, so that stratified pairs stay stratified. (Where all lights are a few triangles without textures,
+    /// what the choice leaves of the first number chooses one of three turns of that point.)
     ///
     /// Returns `None` where nothing can arrive from the part of the lights that `u` leads to; such a `u` counts as a
     /// sample of zero. The densities of all points integrate to the probability of not getting `None`.
