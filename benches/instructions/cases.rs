@@ -89,6 +89,7 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "star/least-nee", calls: CALLS, run: || next_event_least("star") },
     Case { name: "grid-100/sample", calls: CALLS, run: || sample("grid-100") },
     Case { name: "grid-100/nee", calls: CALLS, run: || next_event("grid-100") },
+    Case { name: "grid-100/least-nee", calls: CALLS, run: || next_event_least("grid-100") },
     Case {
         name: "environment/sample",
         calls: CALLS,

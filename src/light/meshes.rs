@@ -2,8 +2,12 @@
 
 /// Returns the mesh that holds a triangle, by the numbers at which the meshes start (and, at last, the one at which
 /// they end).
+#[inline]
 pub(super) fn mesh_of(starts: &[u32], index: u32) -> usize {
     let last = starts.len().saturating_sub(2);
+    if last == 0 {
+        return 0;
+    }
     let total = starts.last().map_or(1, |&end| u64::from(end.max(1)));
     // Meshes are often of similar sizes: search around the position that the mesh would have if all were equal.
     let guess = ((u64::from(index) * (last as u64 + 1) / total) as usize).min(last);

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use super::lights::LightSamplerView;
 #[cfg(doc)]
 use super::point::PointSampler;
-use crate::light::LightLeaf;
+use crate::light::{LightLeaf, MOST_FEW};
 use crate::receiver::{NoLobe, ShadingPoint};
 use crate::record::LightSample;
 use crate::technique::{Variates, Viewpoint};
@@ -22,7 +22,9 @@ impl LightSamplerView<'_> {
             // With bright features a sample is mostly the search for them, and with the environment as a light walks
             // are few. Lobes are of different kinds, and a step goes down for one kind at a time. Instances have walks
             // of their own.
-            let is_apart = self.scene.has_more_than_trees() || self.scene.lights.has_instances();
+            let is_apart = self.scene.has_more_than_trees()
+                || self.scene.lights.has_instances()
+                || self.scene.lights.len() <= MOST_FEW;
             if is_apart || queries.iter().any(|(x, _)| x.receiver.has_lobe()) {
                 let each = queries.iter().zip(samples);
                 each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));

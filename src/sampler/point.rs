@@ -60,12 +60,18 @@ impl<'a> PointSampler<'a> {
     }
 
     /// Draws a point on the lights. `u` is uniform in `[0, 1)³`: the first number chooses the light, the other two the
-    /// point on it, so that stratified pairs stay stratified.
+    /// point on it, so that stratified pairs stay stratified. (Where all lights are a few triangles without textures,
+    /// what the choice leaves of the first number chooses one of three turns of that point.)
     ///
     /// Returns `None` where nothing can arrive from the part of the lights that `u` leads to; such a `u` counts as a
     /// sample of zero. The densities of all points integrate to the probability of not getting `None`.
     #[must_use]
     pub fn sample(&self, u: [f32; 3]) -> Option<LightSample> {
+        if self.at.has_few() {
+            if let Some(sample) = self.at.sample_few(u) {
+                return sample;
+            }
+        }
         let mixture = self.mixture();
         let mixed = mixture.one();
         let mut variates = Variates::new(u);
@@ -129,6 +135,12 @@ impl<'a> PointSampler<'a> {
     /// Where a ray can cross several portals, what a host needs is [`Self::pdf_direction`].
     #[must_use]
     pub fn pdf(&self, hit: &Hit) -> f32 {
+        if self.at.has_few() {
+            let Some(leaf) = self.at.scene.lights.leaf_of_hit(hit) else { return 0.0 };
+            if let Some([_, pdf]) = self.at.density_of_few(leaf, LightPoint::new(leaf, hit.barycentrics).point) {
+                return to_finite(pdf);
+            }
+        }
         self.pdf_of_hit(hit, &self.mixture().one())
     }
 

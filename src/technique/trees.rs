@@ -1,7 +1,7 @@
 //! The tree over the lights, then the tree over the texture of the one that was chosen.
 
 use super::{Density, PlacedPoint, Technique, Variates, Viewpoint};
-use crate::light::{DrawnPoint, LightKind, LightLeaf, LightPoint, LightView, LightViewKind};
+use crate::light::{DrawnPoint, LightKind, LightLeaf, LightPoint, LightView, LightViewKind, LocalPoint};
 use crate::math::{at_least, only_if};
 use crate::tlas::{FirstWeights, Splitting};
 use crate::warp::Variate;
@@ -18,6 +18,16 @@ pub(crate) struct Trees<'t> {
 impl Trees<'_> {
     /// Returns the probability of a light, or the expected number of visits if the tree is split.
     pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: LightLeaf) -> f64 {
+        if self.splitting.is_none() && at.has_few() {
+            if let Some([pmf, _]) = at.density_of_few(leaf, LocalPoint::NONE) {
+                return pmf;
+            }
+        }
+        self.pmf_of_tree(at, leaf)
+    }
+
+    /// Returns the same by walks through the tree.
+    fn pmf_of_tree(&self, at: &Viewpoint<'_>, leaf: LightLeaf) -> f64 {
         let pmf = match self.splitting {
             None => at.scene.tlas.pmf(leaf.top, at, self.first),
             Some(splitting) => at.scene.tlas.expected_count(leaf.top, at, splitting),
@@ -61,7 +71,12 @@ impl Technique for Trees<'_> {
     }
 
     fn density(&self, at: &Viewpoint<'_>, LightPoint { leaf, point }: LightPoint, view: &LightView<'_>) -> Density {
-        match self.pmf(at, leaf) {
+        if self.splitting.is_none() && at.has_few() {
+            if let Some([pmf, pdf]) = at.density_of_few(leaf, point) {
+                return Density { pmf, pdf };
+            }
+        }
+        match self.pmf_of_tree(at, leaf) {
             0.0 => Density { pmf: 0.0, pdf: 0.0 },
             pmf => Density { pmf, pdf: pmf * view.pdf(point).unwrap_or(0.0) },
         }

@@ -5,9 +5,10 @@ use core::f64::consts::PI;
 use glam::Vec3;
 
 use crate::env::{EnvironmentView, RegionMoments};
-use crate::light::{LightKind, LightLeaf, LightPoint, LightView, LightsView};
+use crate::light::{FewTriangles, LightKind, LightLeaf, LightPoint, LightView, LightsView, LocalPoint, MOST_FEW};
 use crate::math::{at_least, only_if};
 use crate::receiver::ShadingPoint;
+use crate::record::LightSample;
 use crate::tlas::{FactorBytes, LeafOracle, TlasView};
 use crate::visibility::RegionFactors;
 
@@ -94,6 +95,34 @@ impl Viewpoint<'_> {
             return None;
         }
         self.scene.lights.view(leaf, &self.x, self.scene.directional_environment())
+    }
+
+    /// Whether the lights may be a few triangles that need no tree ([`FewTriangles`]).
+    #[inline(always)]
+    pub(crate) fn has_few(&self) -> bool {
+        self.scene.lights.len() <= MOST_FEW && !self.scene.lights.has_portals
+    }
+
+    /// Returns the lights if they are a few triangles that need no tree.
+    #[inline(always)]
+    fn few(&self) -> Option<FewTriangles<'_>> {
+        if self.scene.sky.is_some() || self.visibility.is_some() {
+            return None;
+        }
+        FewTriangles::new(&self.scene.lights, &self.x)
+    }
+
+    /// Draws a sample of a few triangles; `Some(None)` where nothing arrives. `None` where the tree has to be asked.
+    #[inline(never)]
+    pub(crate) fn sample_few(&self, u: [f32; 3]) -> Option<Option<LightSample>> {
+        self.few()?.sample(u)
+    }
+
+    /// Returns the probability of one of a few triangles, and the density per solid angle of a point of it. `None` where
+    /// the tree has to be asked.
+    #[inline(never)]
+    pub(crate) fn density_of_few(&self, leaf: LightLeaf, point: LocalPoint) -> Option<[f64; 2]> {
+        self.few()?.density(leaf.top, point.lattice())
     }
 
     /// Estimates the irradiance from all that is infinitely far away and needs no portal: the same at all places.

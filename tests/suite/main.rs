@@ -20,6 +20,7 @@ mod edits;
 mod emission;
 mod environment_light;
 mod errors;
+mod few;
 // The files are of a machine that writes the least byte first.
 #[cfg(target_endian = "little")]
 mod frozen;
