@@ -62,12 +62,7 @@ impl NearTexture {
         }
         let (nearest, distance2) = nearest(view);
         let noise = CELL_NOISE * view.radius2 / at_least(distance2, f32::MIN_POSITIVE);
-        let contrast = contrast(view, nearest);
-        let [of_contrast, least] = CELL_SHARES;
-        let most = 1.0 - at_least(of_contrast * at_most(contrast, 1.0), least);
-        // Where the noise is infinite, this is not a number.
-        let share = most * at_most(noise / (noise + contrast), 1.0);
-        let share = (share - LEAST_SHARE) * (1.0 / (1.0 - LEAST_SHARE));
+        let share = share(view, nearest, noise);
         (share > 0.0).then(|| Self { shares: [share, 1.0 - share] })
     }
 
@@ -138,24 +133,50 @@ fn nearest(view: &TriangleView<'_>) -> ([f32; 2], f32) {
     (found.0, at_least(found.1, height2))
 }
 
-/// Returns the relative variance of the texture, as far as it shows in the averages over the whole triangle's cells and
-/// over those next to a point.
+/// Returns the share of directions, where cells have this noise, by the contrast of the texture as far as it shows in the
+/// averages over the whole triangle's cells and over those next to a point. Not positive where there are none.
 #[inline]
-fn contrast(view: &TriangleView<'_>, nearest: [f32; 2]) -> f32 {
+fn share(view: &TriangleView<'_>, nearest: [f32; 2], noise: f32) -> f32 {
     let mut guide = Follow::new(Lattice::from_barycentrics(nearest));
-    let (mut node, mut squares) = (view.root.node, 1.0);
+    let (mut node, mut squares, mut share) = (view.root.node, 1.0, 1.0);
     for _ in 0..LEVELS {
-        if node == LEAF {
-            break;
-        }
         let averages = blas::averages(view.cells, node);
-        let sum: f32 = averages.iter().sum();
-        let squared: f32 = averages.iter().map(|average| average * average).sum();
-        if sum > 0.0 {
-            squares *= squared * ARITY as f32 / (sum * sum);
+        squares *= 1.0 + contrast(&averages);
+        share = share_at(squares - 1.0, noise);
+        // The contrast only grows.
+        if share <= 0.0 {
+            break;
         }
         let cell = guide.choose(&averages, &Default::default());
         node = blas::below(view.cells, node, cell);
+        if node == LEAF {
+            break;
+        }
     }
-    at_least(squares - 1.0, 0.0)
+    share
+}
+
+/// Returns the share of directions by the contrast of the texture and the noise of the cells.
+#[inline]
+fn share_at(contrast: f32, noise: f32) -> f32 {
+    let [of_contrast, least] = CELL_SHARES;
+    let most = 1.0 - at_least(of_contrast * at_most(contrast, 1.0), least);
+    // Where the noise is infinite, this is not a number.
+    let share = most * at_most(noise / (noise + contrast), 1.0);
+    (share - LEAST_SHARE) * (1.0 / (1.0 - LEAST_SHARE))
+}
+
+/// Returns the relative variance of averages; zero if all of them are.
+#[inline]
+fn contrast(averages: &[f32; ARITY]) -> f32 {
+    const LANES: usize = 8;
+    let (mut sums, mut squares) = ([0.0; LANES], [0.0; LANES]);
+    for lanes in averages.chunks_exact(LANES) {
+        for i in 0..LANES {
+            sums[i] += lanes[i];
+            squares[i] += lanes[i] * lanes[i];
+        }
+    }
+    let [sum, squares] = [sums, squares].map(|lanes| lanes.iter().sum::<f32>());
+    at_least(squares * ARITY as f32 / (sum * sum) - 1.0, 0.0)
 }

@@ -25,10 +25,10 @@ use crate::math::sqrt64;
 const MOST_STEPS: usize = 16;
 
 /// Size of a step, relative to all azimuths, below which the next one makes no difference. Chosen: the method converges
-/// quadratically.
+/// quadratically, so that about its square is left.
 ///
 /// Larger: directions that do not quite follow the density. Smaller: one more step.
-const LEAST_STEP: f64 = 1e-6;
+const LEAST_STEP: f64 = 1e-4;
 
 /// Least projected area. Chosen: of what is smaller, rounding of 1e-16 may be more than 1e-6.
 ///
@@ -50,14 +50,47 @@ pub(crate) struct ProjectedTriangle {
 
 /// A part of a projection that is bounded by two arcs from a corner and by one azimuth.
 struct Wedge {
-    /// Unit direction of the corner.
-    corner: DVec3,
-    /// Unit normals of both great circles, in any order.
-    sides: [DVec3; 2],
     /// Azimuth of the corner, and the one a quarter turn on, towards the other end.
     frame: [DVec3; 2],
     /// Angle from the corner to the other end.
     turn: f64,
+    /// What the corner has along its azimuth and along the normal.
+    corner: [f64; 2],
+    /// Both arcs, in any order.
+    arcs: [Arc; 2],
+    /// Area of all of it.
+    area: f64,
+}
+
+/// A great circle through the corner of a wedge.
+struct Arc {
+    /// What its normal has along both azimuths of the frame, and along the normal of the plane, which is not negative.
+    side: [f64; 3],
+    /// The same of the direction in it that is a quarter turn on from the corner.
+    turned: [f64; 3],
+}
+
+impl Arc {
+    /// Returns the angle from the corner to the azimuth of this sine and cosine.
+    #[inline(always)]
+    fn angle(&self, corner: [f64; 2], [sin, cos]: [f64; 2]) -> f64 {
+        let ([_, _, tilt], [t0, t1, up]) = (self.side, self.turned);
+        // The point of the great circle at the azimuth, of any length, has `tilt` along the azimuth and this upwards.
+        let height = -self.along([sin, cos]);
+        angle((tilt * (t0 * cos + t1 * sin) + height * up).abs(), tilt * corner[0] * cos + height * corner[1])
+    }
+
+    /// Returns the squared radius of the projection at an azimuth.
+    #[inline(always)]
+    fn radius2(&self, azimuth: [f64; 2]) -> f64 {
+        let (tilt, along) = (self.side[2], self.along(azimuth));
+        tilt * tilt / (tilt * tilt + along * along)
+    }
+
+    #[inline(always)]
+    fn along(&self, [sin, cos]: [f64; 2]) -> f64 {
+        self.side[0] * cos + self.side[1] * sin
+    }
 }
 
 impl ProjectedTriangle {
@@ -95,17 +128,14 @@ impl ProjectedTriangle {
         let (long, before, after) = (self.sides[side], self.sides[(side + 2) % 3], self.sides[(side + 1) % 3]);
         let (first, last) = (self.corners[side], self.corners[(side + 1) % 3]);
         let middle = self.corners[(side + 2) % 3];
-        let wedges = [
-            Wedge::new(first, [long, before], middle, self.normal),
-            Wedge::new(last, [long, after], middle, self.normal),
-        ];
-        let [low, high] = wedges.each_ref().map(|wedge| wedge.area(1.0, self.normal).0);
-        let target = u * (low + high);
+        let [start, end] = [(first, before), (last, after)]
+            .map(|(corner, short)| Wedge::new(corner, [long, short], middle, self.normal));
+        let target = u * (start.area + end.area);
         // The second ends in its corner.
-        if target < low {
-            wedges[0].direction([v, target / low], self.normal)
+        if target < start.area {
+            start.direction([v, target / start.area], self.normal)
         } else {
-            wedges[1].direction([v, (low + high - target) / high], self.normal)
+            end.direction([v, (start.area + end.area - target) / end.area], self.normal)
         }
     }
 
@@ -134,50 +164,47 @@ impl ProjectedTriangle {
 }
 
 impl Wedge {
+    #[inline]
     fn new(corner: DVec3, sides: [DVec3; 2], other: DVec3, normal: DVec3) -> Self {
         let across = |direction: DVec3| direction - normal * direction.dot(normal);
         let start = across(corner).normalize_or(normal.any_orthonormal_vector());
         let (end, turned) = (across(other), normal.cross(start));
         let sin = turned.dot(end);
-        let turned = if sin < 0.0 { -turned } else { turned };
-        Self { corner, sides, frame: [start, turned], turn: angle(sin.abs(), start.dot(end)) }
+        let frame = [start, if sin < 0.0 { -turned } else { turned }];
+        let parts = |vector: DVec3| [frame[0].dot(vector), frame[1].dot(vector), normal.dot(vector)];
+        let arcs = sides.map(|side| {
+            let side = if side.dot(normal) < 0.0 { -side } else { side };
+            Arc { side: parts(side), turned: parts(side.cross(corner)) }
+        });
+        let corner = [start.dot(corner), normal.dot(corner)];
+        let wedge = Self { frame, turn: angle(sin.abs(), start.dot(end)), corner, arcs, area: 0.0 };
+        Self { area: wedge.area_up_to(1.0).0, ..wedge }
     }
 
     /// Returns the area up to a share of the turn, and its derivative.
     #[inline]
-    fn area(&self, share: f64, normal: DVec3) -> (f64, f64) {
-        let azimuth = self.azimuth(share);
-        let parts = self.sides.map(|side| {
-            let (tilt, along) = (side.dot(normal), side.dot(azimuth));
-            // A point of the great circle, whichever length.
-            let end = azimuth * tilt.abs() - normal * (if tilt < 0.0 { -along } else { along });
-            let arc = angle(side.dot(self.corner.cross(end)).abs(), self.corner.dot(end));
-            (arc * tilt.abs(), tilt * tilt / (tilt * tilt + along * along))
-        });
-        (0.5 * (parts[0].0 - parts[1].0).abs(), 0.5 * self.turn * (parts[0].1 - parts[1].1).abs())
-    }
-
-    #[inline]
-    fn azimuth(&self, share: f64) -> DVec3 {
+    fn area_up_to(&self, share: f64) -> (f64, f64) {
         let (sin, cos) = sin_cos(self.turn * share);
-        self.frame[0] * cos + self.frame[1] * sin
+        let [a, b] = &self.arcs;
+        let azimuth = [sin, cos];
+        let area = a.side[2] * a.angle(self.corner, azimuth) - b.side[2] * b.angle(self.corner, azimuth);
+        (0.5 * area.abs(), 0.5 * self.turn * (a.radius2(azimuth) - b.radius2(azimuth)).abs())
     }
 
     /// Returns the direction at shares of the squared radius between both arcs, and of the area up to the azimuth.
     fn direction(&self, [v, share]: [f64; 2], normal: DVec3) -> DVec3 {
-        let all = self.area(1.0, normal).0;
         // The area grows with the square of the turn, so that its root is about linear.
         let target = sqrt64(share);
         let (mut low, mut high, mut t) = (0.0, 1.0, target);
         for _ in 0..MOST_STEPS {
-            let (area, slope) = self.area(t, normal);
-            let root = sqrt64(area / all);
+            let (area, slope) = self.area_up_to(t);
+            let root = sqrt64(area / self.area);
             if root < target {
                 low = t
             } else {
                 high = t
             }
-            let next = t - (root - target) * 2.0 * root * all / slope;
+            let next = t - (root - target) * 2.0 * root * self.area / slope;
             // NaN fails.
             let next = if next > low && next < high { next } else { 0.5 * (low + high) };
             let step = next - t;
@@ -186,14 +213,11 @@ impl Wedge {
                 break;
             }
         }
-        let azimuth = self.azimuth(t);
-        let [a, b] = self.sides.map(|side| {
-            let (tilt, along) = (side.dot(normal), side.dot(azimuth));
-            tilt * tilt / (tilt * tilt + along * along)
-        });
+        let (sin, cos) = sin_cos(self.turn * t);
+        let [a, b] = self.arcs.each_ref().map(|arc| arc.radius2([sin, cos]));
         let (inner, outer) = (a.min(b), a.max(b));
         let radius2 = inner + v * (outer - inner);
-        azimuth * sqrt64(radius2) + normal * sqrt64(positive(1.0 - radius2))
+        (self.frame[0] * cos + self.frame[1] * sin) * sqrt64(radius2) + normal * sqrt64(positive(1.0 - radius2))
     }
 }
 
