@@ -120,8 +120,6 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "street-moving-triangles/nee", calls: CALLS, run: || street(Street::MovingTriangles, true) },
     Case { name: "star-instance/nee", calls: CALLS, run: || star_instances(1) },
     Case { name: "star-10000-instances/nee", calls: CALLS, run: || star_instances(10_000) },
-    Case { name: "near/nee", calls: CALLS, run: || near(false) },
-    Case { name: "near-spots/nee", calls: CALLS, run: || near(true) },
 ];
 
 /// A point of a triangle that no workload has: its density costs what the first call at a shading point finds for all,
@@ -458,36 +456,6 @@ fn street(kind: Street, with_density: bool) {
             if with_density {
                 black_box(here.pdf_sample_direction(&sample));
             }
-            black_box(sample);
-        }
-    });
-}
-
-/// Points a hundredth of its size away from a square, which has the spots of the quad or nothing on it.
-fn near(has_spots: bool) {
-    let positions = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
-    let uvs = positions.map(|position| 0.5 * position.truncate() + 0.5);
-    let image = scenes::scene("quad").image.expect("there is one");
-    let texture = Texture::new(image.size, image.size, &image.texels).expect("the image is finite");
-    let mut builder = LightSampler::builder();
-    let mut mesh = Mesh::emitter(&positions, &[[0, 2, 1], [0, 3, 2]]);
-    if has_spots {
-        mesh = mesh.uvs(&uvs).weight(Weight::Texture(builder.add_texture(texture.filter(image.filter))));
-    }
-    builder.add_mesh(&mesh).expect("the square is sound");
-    let lights = builder.build().expect("the scene is small");
-    let mut pcg = Pcg32::new(6, 6);
-    let points: Vec<ShadingPoint> = (0..CALLS)
-        .map(|_| {
-            let [x, y, _] = pcg.uniform3();
-            ShadingPoint::surface(Vec3::new(1.8 * x - 0.9, 1.8 * y - 0.9, -0.02), Vec3::Z)
-        })
-        .collect();
-    let numbers = numbers();
-    measured(|i| {
-        let here = lights.at(&points[i]);
-        if let Some(sample) = here.sample(numbers[i]) {
-            black_box(here.pdf_sample_direction(&sample));
             black_box(sample);
         }
     });

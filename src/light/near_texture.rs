@@ -69,28 +69,30 @@ impl NearTexture {
     /// Draws a point.
     pub(super) fn sample(&self, view: &TriangleView<'_>, [mut v, u]: [Variate; 2]) -> Option<DrawnPoint> {
         let is_by_cell = pick_pair(self.shares, &mut v) == 1;
-        if is_by_cell {
-            let drawn = view.sample_cell([v, u])?;
-            let direction = view.pdf_of_direction(drawn.point.lattice());
-            return Some(DrawnPoint { pdf: self.mix(direction, Some(drawn.pdf)), ..drawn });
-        }
-        match view.sample_direction([v, u]) {
-            Some(drawn) => {
+        if !is_by_cell {
+            if let Some(drawn) = view.sample_direction([v, u]) {
                 let drawn = drawn?;
-                Some(DrawnPoint {
-                    pdf: self.mix(Some(Some(drawn.pdf)), self.pdf_of_cell(view, drawn.point.lattice())),
-                    ..drawn
-                })
+                let pdf = self.mix(Some(drawn.pdf), self.pdf_of_cell(view, drawn.point.lattice()));
+                return Some(DrawnPoint { pdf, ..drawn });
             }
-            None => view.sample_cell([v, u]),
         }
+        let drawn = view.sample_cell([v, u])?;
+        Some(match view.pdf_of_direction(drawn.point.lattice()) {
+            Some(direction) => DrawnPoint { pdf: self.mix(direction, Some(drawn.pdf)), ..drawn },
+            None => drawn,
+        })
     }
 
     /// Returns the density per solid angle of a point. `None` where it is not a positive number.
     pub(super) fn pdf(&self, view: &TriangleView<'_>, point: Lattice) -> Option<f64> {
-        let direction = view.pdf_of_direction(point);
-        let pdf = self.mix(direction, self.pdf_of_cell(view, point));
-        (pdf > 0.0).then_some(pdf)
+        match view.pdf_of_direction(point) {
+            Some(direction) => {
+                let pdf = self.mix(direction, self.pdf_of_cell(view, point));
+                (pdf > 0.0).then_some(pdf)
+            }
+            // Too little solid angle: all points are drawn by cells.
+            None => view.pdf_of_cell(point),
+        }
     }
 
     #[inline]
@@ -98,13 +100,11 @@ impl NearTexture {
         if self.shares[1] > 0.0 { view.pdf_of_cell(point) } else { None }
     }
 
-    /// Returns the density of both. `direction` is `None` where no point is drawn by direction.
+    /// Returns the density of both.
     #[inline]
-    fn mix(&self, direction: Option<Option<f64>>, cell: Option<f64>) -> f64 {
-        let cell = cell.unwrap_or(0.0);
-        let Some(direction) = direction else { return cell };
+    fn mix(&self, direction: Option<f64>, cell: Option<f64>) -> f64 {
         let [a, b] = self.shares.map(f64::from);
-        (a * direction.unwrap_or(0.0) + b * cell) / (a + b)
+        (a * direction.unwrap_or(0.0) + b * cell.unwrap_or(0.0)) / (a + b)
     }
 }
 
