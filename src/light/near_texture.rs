@@ -63,7 +63,7 @@ impl NearTexture {
         let (nearest, distance2) = nearest(view);
         let noise = CELL_NOISE * view.radius2 / at_least(distance2, f32::MIN_POSITIVE);
         let share = share(view, nearest, noise);
-        (share > 0.0).then(|| Self { shares: [share, 1.0 - share] })
+        (share > 0.0).then_some(Self { shares: [share, 1.0 - share] })
     }
 
     /// Draws a point.

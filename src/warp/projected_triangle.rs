@@ -200,9 +200,9 @@ impl Wedge {
             let (area, slope) = self.area_up_to(t);
             let root = sqrt64(area / self.area);
             if root < target {
-                low = t
+                low = t;
             } else {
-                high = t
+                high = t;
             }
             let next = t - (root - target) * 2.0 * root * self.area / slope;
             // NaN fails.
