@@ -46,7 +46,7 @@ const FIXED_BITS: u32 = 30;
 /// directions between cells.
 ///
 /// Larger: more of the small triangles are divided by area. Smaller: densities could be those of a neighboring cell.
-const LEAST_SOLID_ANGLE: f64 = 1e-6;
+pub(super) const LEAST_SOLID_ANGLE: f64 = 1e-6;
 
 /// Ratio of a chord to the largest distance from the pole up to which radii of cells are bounded. *Proved*: an arc
 /// grows by at most 1.4003 times its chord there.

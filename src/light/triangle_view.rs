@@ -6,6 +6,8 @@ use glam::{DVec3, Vec3};
 
 use super::cell_kernel::CellDescent;
 use super::linear_density::LinearDensity;
+use super::near_texture::NearTexture;
+use super::projected_part::ProjectedPart;
 use super::spherical_grid::{GridCell, SphericalGrid};
 use super::{
     DrawnPoint, Illumination, LightKind, LightTriangle, LightViewKind, LocalPoint, MovingTriangle, PlacedTriangle,
@@ -36,6 +38,12 @@ const CLOSE_RATIO: f32 = 256.0;
 /// Larger: directions are drawn uniformly, with a relative deviation of 0.58, where they could be drawn by weight.
 /// Smaller: rounding to the lattice would bias samples.
 const RESOLVED_HEIGHT: f64 = 8.0 / 16_777_216.0;
+
+/// Ratio of squared radius to squared distance of the center from which on points without a texture are drawn by the
+/// cosine of a diffuse surface. *Measured* (docs/ACCURACY.md, "Near lights").
+///
+/// Larger: cells of directions leave a variance of up to 0.05. Smaller: more instructions, where they leave 0.001.
+const PROJECTED: f32 = 0.5;
 
 /// How far rounding to the lattice moves a point along both edges, in units of the edges. *Proved*: half a unit of the
 /// lattice, and one more next to the triangle's own edges.
@@ -249,13 +257,64 @@ impl<'a> TriangleView<'a> {
     /// Whether all directions to what is visible of a triangle without a texture are equally likely.
     #[inline(always)]
     fn draws_uniformly(&self) -> bool {
-        self.effort == Effort::Least || !self.resolves_directions()
+        let is_even = matches!(self.receiver, Receiver::Volume) && self.environment.is_none();
+        is_even || self.effort == Effort::Least || !self.resolves_directions()
     }
 
     /// Whether the lattice resolves directions.
     #[inline(always)]
-    fn resolves_directions(&self) -> bool {
+    pub(super) fn resolves_directions(&self) -> bool {
         self.exact_height >= RESOLVED_HEIGHT * f64::from(math::sqrt(self.radius2))
+    }
+
+    /// Returns what is visible as a diffuse surface sees it, if all points send the same and are drawn by the cosine.
+    #[inline]
+    fn projected(&self) -> Option<ProjectedPart> {
+        let is_even = matches!(self.receiver, Receiver::Surface(_)) && self.environment.is_none();
+        let [a, b, c] = self.vertices;
+        let is_near = self.radius2 > PROJECTED * ((a + b + c) * (1.0 / 3.0)).length_squared();
+        if is_even && is_near && !self.draws_uniformly() { ProjectedPart::new(self) } else { None }
+    }
+
+    /// Returns how points of a texture are drawn that is near; `None` where they are drawn by cells alone.
+    #[inline]
+    fn near_texture(&self) -> Option<NearTexture> {
+        if self.illumination == Illumination::ClampedVertices { NearTexture::new(self) } else { None }
+    }
+
+    /// Draws a point by its direction. `None` where there is too little solid angle, and points are drawn by cells.
+    #[inline(always)]
+    pub(super) fn sample_direction(&self, u: [Variate; 2]) -> Option<Option<DrawnPoint>> {
+        if let Some(part) = self.projected() {
+            return Some(part.sample(self, u));
+        }
+        for_lobe!(self.receiver, lobe => InstructionSet::best().run(SampleDirection { view: self, lobe, u }))
+    }
+
+    /// Returns the density per solid angle of a point that [`Self::sample_direction`] draws.
+    #[inline]
+    pub(super) fn pdf_of_direction(&self, point: Lattice) -> Option<Option<f64>> {
+        if let Some(part) = self.projected() {
+            return Some(part.pdf(self.position(point)));
+        }
+        for_lobe!(self.receiver, lobe => InstructionSet::best().run(PdfOfDirection { view: self, lobe, point }))
+    }
+
+    /// Draws a point by the cells of the triangle.
+    #[inline(always)]
+    pub(super) fn sample_cell(&self, u: [Variate; 2]) -> Option<DrawnPoint> {
+        let mut draw = Draw::new(u);
+        let (cell, cell_pmf) = self.descend(&mut draw)?;
+        let point = draw.point(cell);
+        let pdf = self.pdf_in(cell, cell_pmf, point)?;
+        Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative: self.position(point), pdf })
+    }
+
+    /// Returns the density per solid angle of a point that [`Self::sample_cell`] draws.
+    #[inline]
+    pub(super) fn pdf_of_cell(&self, point: Lattice) -> Option<f64> {
+        let (cell, cell_pmf) = self.descend(&mut Follow::new(point))?;
+        self.pdf_in(cell, cell_pmf, point)
     }
 }
 
@@ -266,17 +325,13 @@ impl LightViewKind for TriangleView<'_> {
             if let Some(density) = LinearDensity::new(self) {
                 return density.sample(self, u);
             }
-            let drawn =
-                for_lobe!(self.receiver, lobe => InstructionSet::best().run(SampleDirection { view: self, lobe, u }));
-            if let Some(drawn) = drawn {
+            if let Some(drawn) = self.sample_direction(u) {
                 return drawn;
             }
+        } else if let Some(near) = self.near_texture() {
+            return near.sample(self, u);
         }
-        let mut draw = Draw::new(u);
-        let (cell, cell_pmf) = self.descend(&mut draw)?;
-        let point = draw.point(cell);
-        let pdf = self.pdf_in(cell, cell_pmf, point)?;
-        Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative: self.position(point), pdf })
+        self.sample_cell(u)
     }
 
     #[inline]
@@ -286,13 +341,13 @@ impl LightViewKind for TriangleView<'_> {
             if let Some(density) = LinearDensity::new(self) {
                 return density.pdf(self, point);
             }
-            let pdf = for_lobe!(self.receiver, lobe => InstructionSet::best().run(PdfOfDirection { view: self, lobe, point }));
-            if let Some(pdf) = pdf {
+            if let Some(pdf) = self.pdf_of_direction(point) {
                 return pdf;
             }
+        } else if let Some(near) = self.near_texture() {
+            return near.pdf(self, point);
         }
-        let (cell, cell_pmf) = self.descend(&mut Follow::new(point))?;
-        self.pdf_in(cell, cell_pmf, point)
+        self.pdf_of_cell(point)
     }
 
     #[inline]

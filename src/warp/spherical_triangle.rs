@@ -87,6 +87,12 @@ impl SphericalTriangle {
         self.solid_angle
     }
 
+    /// Returns the unit directions of the corners, in positive orientation as seen from the origin.
+    #[inline(always)]
+    pub(crate) fn corners(&self) -> [DVec3; 3] {
+        [self.a, self.b, self.c]
+    }
+
     /// Returns the unit direction of the corner that all columns meet in.
     #[inline(always)]
     pub(crate) fn pole(&self) -> DVec3 {
@@ -178,13 +184,13 @@ impl SphericalTriangle {
 
 /// The number, or zero where it is negative or NaN.
 #[inline(always)]
-fn positive(x: f64) -> f64 {
+pub(super) fn positive(x: f64) -> f64 {
     if x > 0.0 { x } else { 0.0 }
 }
 
 /// Returns sine and cosine of an angle in `[0, π]`, within 1e-12; the sine of a small angle to the same relative error.
 #[inline(always)]
-fn sin_cos(angle: f64) -> (f64, f64) {
+pub(super) fn sin_cos(angle: f64) -> (f64, f64) {
     // Reciprocal factorials.
     const S3: f64 = -1.0 / 6.0;
     const S5: f64 = -S3 / 20.0;
@@ -211,7 +217,7 @@ fn sin_cos(angle: f64) -> (f64, f64) {
 
 /// Returns the angle of the point `(x, y)` in `[0, π]` for `y >= 0`, within a relative error of 1e-12.
 #[inline(always)]
-fn angle(y: f64, x: f64) -> f64 {
+pub(super) fn angle(y: f64, x: f64) -> f64 {
     let size = x.abs();
     let is_steep = y > size;
     let (minor, major) = if is_steep { (size, y) } else { (y, size) };
