@@ -39,7 +39,8 @@ pub(crate) const MOST_FEW: usize = 8;
 const LEAST_LANES: usize = 2;
 
 /// Ratio of the mean squared distance of the corners from the centroid to the squared distance of the centroid, up to
-/// which the density is linear. *Measured* in the Cornell box (docs/ACCURACY.md, "A few triangles").
+/// which the density is linear. *Chosen* so that the Cornell box is below it, where its noise was measured
+/// (docs/ACCURACY.md, "A few triangles"); no other value was tried.
 ///
 /// Larger: more noise next to lights. Smaller: more points at which the tree is asked as well.
 const LINEAR_SPREAD: f64 = 0.3;
@@ -146,7 +147,7 @@ impl<'a> FewTriangles<'a> {
             let (a2, b2, c2) = (a.length_squared(), b.length_squared(), c.length_squared());
             let side = front.dot(a);
             let (wa, wb, wc) = (normal.dot(a) / (a2 * a2), normal.dot(b) / (b2 * b2), normal.dot(c) / (c2 * c2));
-            // Three times the centroid. The mean square of the corners is that of the centroid and the spread around it.
+            // Three times the centroid. Corners have its mean square and that of the spread around it.
             let center2 = (a + b + c).length_squared();
             let is_small = a2 + b2 + c2 <= (1.0 + LINEAR_SPREAD) * (1.0 / 3.0) * center2;
             let (least, largest) = (smaller(smaller(wa, wb), wc), larger(larger(wa, wb), wc));
