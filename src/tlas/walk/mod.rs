@@ -8,6 +8,7 @@ pub(in crate::tlas) mod descend;
 mod groups;
 mod importance;
 mod learned;
+mod opening;
 pub(in crate::tlas) mod ray;
 mod segment;
 mod shaped;
