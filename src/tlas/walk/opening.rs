@@ -39,6 +39,12 @@ fn total<const N: usize>(weights: &[f32; N]) -> f32 {
 }
 
 impl<const N: usize> Estimates<N> {
+    /// Returns those of a node without children.
+    #[inline(always)]
+    pub(super) fn none() -> Self {
+        Self { weights: [0.0; N], largest: 0, doubtful: [0; 2], opened: 0, around: 0, unsure: 0 }
+    }
+
     /// Returns the children that are to be opened because nothing may arrive from any of their lights, as a set of
     /// bits.
     #[inline(always)]
@@ -63,14 +69,23 @@ impl<const N: usize> WideTree<'_, N> {
     /// themselves.
     #[inline(always)]
     pub(super) fn opened(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> f32 {
-        let mut waiting = [index as u32; MOST_OPENED];
-        let (mut next, mut end, mut sum) = (0, 1, 0.0);
+        self.opened_from(index, self.estimated(index, x, oracle), x, oracle)
+    }
+
+    /// Returns [`opened`](Self::opened) by the estimates of the node's children.
+    #[inline(always)]
+    pub(super) fn opened_from(
+        &self,
+        mut index: usize,
+        mut estimates: Estimates<N>,
+        x: &ReceiverLanes<impl Lobe>,
+        oracle: &impl LeafOracle,
+    ) -> f32 {
+        let mut waiting = [0; MOST_OPENED];
+        let (mut next, mut end, mut sum) = (1, 1, 0.0);
         // What is known of walls is known of the children of few nodes, and stays with them.
         let most = if oracle.has_factors() { 1 } else { MOST_OPENED };
-        while next < end {
-            let index = waiting[next] as usize;
-            next += 1;
-            let mut estimates = self.estimated(index, x, oracle);
+        loop {
             let mut around = estimates.around;
             while around != 0 && end < most {
                 let lane = around.trailing_zeros();
@@ -80,7 +95,12 @@ impl<const N: usize> WideTree<'_, N> {
                 end += 1;
             }
             sum += total(&estimates.weights);
+            if next == end {
+                return only_if(sum > 0.0, within_range(sum));
+            }
+            index = waiting[next] as usize;
+            next += 1;
+            estimates = self.estimated(index, x, oracle);
         }
-        only_if(sum > 0.0, within_range(sum))
     }
 }
