@@ -13,7 +13,7 @@ Renders scenes without and with fanlight in the same time, and prints their erro
 
 Usage: cargo run --release -p fanlight-gallery -- NAME | all | FILE.gltf | FILE.glb | export DIR [OPTIONS]
 
-  NAME             room, car, lantern, letters, pinhole, facade, nested, neon, fog or street
+  NAME             room, car, lantern, letters, pinhole, facade, nested, neon, fog, street or glossy
   all              all of them, and a contact sheet
   FILE             a glTF scene; --bounces, --env and --size say what it does not
   export DIR       writes all built-in scenes as glTF

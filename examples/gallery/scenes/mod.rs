@@ -5,6 +5,7 @@ extern crate alloc;
 mod car;
 mod facade;
 mod fog;
+mod glossy;
 mod glyphs;
 mod lantern;
 mod letters;
@@ -37,7 +38,7 @@ pub(crate) struct Scene {
 }
 
 /// All scenes, in the order of the contact sheet.
-pub(crate) const ALL: [Scene; 10] = [
+pub(crate) const ALL: [Scene; 11] = [
     Scene { name: "room", model: room::room, bounces: &[1, 5], detail: [0.72, 0.8] },
     Scene { name: "car", model: car::car, bounces: &[1, 5], detail: [0.5, 0.62] },
     Scene { name: "lantern", model: lantern::lantern, bounces: &[4], detail: [0.3, 0.75] },
@@ -48,4 +49,5 @@ pub(crate) const ALL: [Scene; 10] = [
     Scene { name: "neon", model: neon, bounces: &[1], detail: [0.35, 0.85] },
     Scene { name: "fog", model: fog::fog, bounces: &[2], detail: [0.5, 0.5] },
     Scene { name: "street", model: street::street, bounces: &[1, 3], detail: [0.35, 0.75] },
+    Scene { name: "glossy", model: glossy::glossy, bounces: &[1, 5], detail: [0.42, 0.75] },
 ];
