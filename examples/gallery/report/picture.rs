@@ -56,6 +56,14 @@ impl Picture {
     }
 }
 
+/// The two images of a picture that was saved before.
+pub(crate) fn images_of(path: &Path) -> Result<[RgbImage; 2], Error> {
+    let picture = image::open(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?.into_rgb8();
+    let (width, height) = (picture.width().saturating_sub(GAP) / 2, picture.height());
+    let height = height.saturating_sub(GAP + ENLARGED * DETAIL.1);
+    Ok([0, width + GAP].map(|left| imageops::crop_imm(&picture, left, 0, width, height).to_image()))
+}
+
 /// Pairs of pictures with their names, three to a row.
 pub(crate) fn contact_sheet(pairs: &[(&str, [RgbImage; 2])]) -> RgbImage {
     const COLUMNS: u32 = 3;
