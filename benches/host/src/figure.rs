@@ -88,14 +88,18 @@ fn panel(svg: &mut String, [left, top]: [f64; 2], rows: &[Row], x: [f64; 2], y: 
         // Of fanlight's variants only the plain one is drawn.
         let drawn = rows.iter().filter(|row| kind(row) == wanted && !row.method.starts_with("fanlight@"));
         for Row { curve, .. } in drawn {
-            let points = curve.iter().filter(|[_, error]| *error > 0.0);
-            let points: Vec<String> =
-                points.map(|[s, error]| format!("{:.1},{:.1}", across(s.log10()), down(error.log10()))).collect();
+            let points: Vec<[f64; 2]> = curve.iter().copied().filter(|[_, error]| *error > 0.0).collect();
+            let Some(last) = points.last() else { continue };
+            let place = |[s, error]: [f64; 2]| [across(s.log10()), down(error.log10())];
+            let line: Vec<String> =
+                points.iter().map(|point| place(*point)).map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+            let ([x, y], color) = (place(*last), COLORS[wanted]);
+            // A single image is a dot.
             let _ = writeln!(
                 svg,
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>",
-                points.join(" "),
-                COLORS[wanted]
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.6\"/>\
+                 <circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2\" fill=\"{color}\"/>",
+                line.join(" ")
             );
         }
     }

@@ -15,8 +15,8 @@ const GAP: u32 = 4;
 /// Size and enlargement of the details.
 const DETAIL: (u32, u32) = (44, 33);
 const ENLARGED: u32 = 3;
-/// Size of one image on the contact sheet: half of what is rendered.
-const TILE: (u32, u32) = (104, 78);
+/// Size of one image on the contact sheet: less than half of what is rendered, for a sheet of less than 300 kB.
+const TILE: (u32, u32) = (92, 69);
 
 /// Images of one scene in the same exposure.
 pub(crate) struct Picture {
