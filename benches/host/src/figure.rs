@@ -14,8 +14,8 @@ const CELL: [f64; 2] = [158.0, 130.0];
 const LEFT: f64 = 34.0;
 const TOP: f64 = 24.0;
 
-/// Returns a panel for each scene and number of bounces, with a line for each method: logarithmic axes, the same seconds
-/// and as many decades of relMSE in all of them, so that slopes and distances compare.
+/// Returns a panel for each scene and number of bounces, with a line for each method: logarithmic axes, the same
+/// seconds and as many decades of relMSE in all of them, so that slopes and distances compare.
 pub(crate) fn draw(rows: &[Row]) -> String {
     let panels: Vec<&[Row]> = rows.chunk_by(|a, b| a.scene == b.scene && a.bounces == b.bounces).collect();
     let seconds = bounds(rows.iter().flat_map(|row| &row.curve).map(|point| point[0]));
@@ -68,8 +68,8 @@ fn panel(svg: &mut String, [left, top]: [f64; 2], rows: &[Row], x: [f64; 2], y: 
         let at = across(exponent.into());
         let _ = writeln!(
             svg,
-            "<path d=\"M{at:.1} {top}V{bottom}\" stroke=\"#ddd\"/><text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{} s\
-             </text>",
+            "<path d=\"M{at:.1} {top}V{bottom}\" stroke=\"#ddd\"/>\
+             <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{} s</text>",
             bottom + 11.0,
             10.0_f64.powi(exponent)
         );
@@ -84,7 +84,7 @@ fn panel(svg: &mut String, [left, top]: [f64; 2], rows: &[Row], x: [f64; 2], y: 
         svg.push('\n');
     }
     let kind = |row: &Row| if row.method == "fanlight" { 2 } else { usize::from(row.is_best) };
-    for wanted in 0..COLORS.len() {
+    for (wanted, color) in COLORS.into_iter().enumerate() {
         // Of fanlight's variants only the plain one is drawn.
         let drawn = rows.iter().filter(|row| kind(row) == wanted && !row.method.starts_with("fanlight@"));
         for Row { curve, .. } in drawn {
@@ -93,7 +93,7 @@ fn panel(svg: &mut String, [left, top]: [f64; 2], rows: &[Row], x: [f64; 2], y: 
             let place = |[s, error]: [f64; 2]| [across(s.log10()), down(error.log10())];
             let line: Vec<String> =
                 points.iter().map(|point| place(*point)).map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
-            let ([x, y], color) = (place(*last), COLORS[wanted]);
+            let [x, y] = place(*last);
             // A single image is a dot.
             let _ = writeln!(
                 svg,

@@ -53,8 +53,8 @@ impl Fanlight<'_> {
         &self.sampler
     }
 
-    /// One of several samples, chosen by a target per solid angle, and its contribution weight. No ray may cross several
-    /// portals.
+    /// One of several samples, chosen by a target per solid angle, and its contribution weight. No ray may cross
+    /// several portals.
     pub(crate) fn resampled(
         &self,
         x: &ShadingPoint,

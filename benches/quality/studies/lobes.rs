@@ -1,12 +1,12 @@
 //! Glossy receivers: how much noise there is if lights are sampled with and without regard to the lobe, if the lobe
 //! alone is sampled, and if both are, weighted by the balance heuristic.
 //!
-//! The receiver reflects `kd cos θ / π + ks D G / (4 cos θo)`, GGX with height-correlated masking and without Fresnel. A
-//! brushed one has a roughness along a tangent and another across. A rough pane reflects a tenth, and the rest of the
+//! The receiver reflects `kd cos θ / π + ks D G / (4 cos θo)`, GGX with height-correlated masking and without Fresnel.
+//! A brushed one has a roughness along a tangent and another across. A rough pane reflects a tenth, and the rest of the
 //! lobe is mirrored to its other side.
 //!
-//! `resampled-8` is what a host does whose BSDF the crate does not know: a pair whose light sample is one of eight blind
-//! ones, chosen by what it brings.
+//! `resampled-8` is what a host does whose BSDF the crate does not know: a pair whose light sample is one of eight
+//! blind ones, chosen by what it brings.
 //! Emitters do not cover each other: a ray sees all that it crosses.
 
 use core::f64::consts::{FRAC_1_PI, PI, TAU};
