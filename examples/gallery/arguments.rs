@@ -11,10 +11,11 @@ use crate::render::{Budget, Error};
 pub(crate) const HELP: &str = "\
 Renders scenes without and with fanlight in the same time, and prints their errors against a long reference.
 
-Usage: cargo run --release -p fanlight-gallery -- NAME | all | FILE.gltf | FILE.glb | export DIR [OPTIONS]
+Usage: cargo run --release -p fanlight-gallery -- NAME | all | contact | FILE.gltf | FILE.glb | export DIR [OPTIONS]
 
-  NAME             room, car, lantern, letters, pinhole, facade, nested, neon, fog, street or town
+  NAME             room, car, lantern, letters, pinhole, facade, nested, neon, fog, street, town or glossy
   all              all of them, and a contact sheet
+  contact          the contact sheet alone, of the pictures that are in the folder
   FILE             a glTF scene; --bounces, --env and --size say what it does not
   export DIR       writes all built-in scenes as glTF
 
@@ -40,6 +41,7 @@ For a FILE:
 pub(crate) enum Task {
     Scene(String),
     All,
+    Contact,
     File(PathBuf),
     Export(PathBuf),
 }
@@ -87,6 +89,7 @@ impl Arguments {
                 Value(word) if task.is_none() => {
                     task = Some(match word.to_str() {
                         Some("all") => Task::All,
+                        Some("contact") => Task::Contact,
                         Some("export") => Task::Export(parser.value()?.into()),
                         Some(name) if !name.contains(['.', '/', '\\']) => Task::Scene(name.to_owned()),
                         _ => Task::File(word.into()),

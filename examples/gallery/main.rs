@@ -42,6 +42,15 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
             }
             report::save(&report::contact_sheet(&pairs), &folder.join("contact.png"))
         }
+        Task::Contact => {
+            let path = |scene: &Scene| folder.join(scene.name).with_extension("png");
+            let there = scenes::ALL.iter().filter(|scene| path(scene).exists());
+            let pairs = there.map(|scene| Ok((scene.name, report::images_of(&path(scene))?)));
+            report::save(
+                &report::contact_sheet(&pairs.collect::<Result<Vec<_>, Error>>()?),
+                &folder.join("contact.png"),
+            )
+        }
         Task::Scene(name) => {
             let known = || scenes::ALL.map(|scene| scene.name).join(", ");
             let scene = scenes::ALL.iter().find(|scene| scene.name == name);

@@ -2,6 +2,7 @@
 
 mod builder;
 mod bytes;
+mod credit;
 mod distant_rays;
 mod edit;
 mod emission;

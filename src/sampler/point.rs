@@ -44,7 +44,7 @@ impl<'a> PointSampler<'a> {
 
     /// Returns the techniques at this point.
     #[inline(always)]
-    fn mixture(&self) -> Ref<'_, Mixture> {
+    pub(super) fn mixture(&self) -> Ref<'_, Mixture> {
         if self.at.scene.has_more_than_trees() {
             self.look_beside();
         }

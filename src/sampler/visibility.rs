@@ -188,21 +188,28 @@ impl VisibilityCounters {
     /// that drew the sample. Samples of lights that it does not have, and those at positions that are not finite, are
     /// ignored.
     ///
+    /// Where the sample got through several portals, what it says is shared among them: it counts most for the one that
+    /// finds the direction most easily, since samples on the others are not needed for it.
+    ///
     /// If `here` has a table itself, a report costs about as much as the density of a hit; otherwise a few dozen
-    /// instructions.
+    /// instructions. Of a sample that got through a portal behind which there may be others, it costs as much as the
+    /// density of a direction.
     pub fn report(&mut self, here: &PointSampler<'_>, sample: &LightSample, transmittance: f32) {
         let (x, scene) = (&here.at.x, &here.at.scene);
         if scene.tlas.node_count() != self.header.nodes as usize {
             return;
         }
         let Some(region) = self.regions.find(orientation(&x.receiver), x.position) else { return };
-        let mut weight = 1.0;
+        let (mut weight, mut credit) = (1.0, 1.0);
         let key = match (scene.lights.leaf_of_sampled(&sample.light), &sample.light) {
             (Some(leaf), _) => {
                 let is_portal = scene.lights.is_portal(leaf);
                 if is_portal && scene.has_features() && scene.environment.feature_at(sample.direction).is_some() {
                     LeafKey::feature(leaf.top)
                 } else {
+                    if let (true, SampledLight::Triangle(hit)) = (is_portal && transmittance > 0.0, &sample.light) {
+                        credit = here.credit(leaf, hit, sample.direction);
+                    }
                     if here.at.visibility.is_some() {
                         // As if the sample had been drawn without the table: else lanes would seem as visible as what
                         // the table has left of them.
@@ -220,7 +227,7 @@ impl VisibilityCounters {
             (None, _) => return,
         };
         self.regions.extents[region as usize].add(x.position);
-        self.counts.report(region, key, transmittance, weight);
+        self.counts.report(region, key, credit * transmittance, weight);
     }
 
     /// Adds all reports of other counters.

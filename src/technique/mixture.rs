@@ -323,6 +323,12 @@ impl Mixed<'_> {
         self.complete(at, point, self.trees.density(at, point, view), view).pdf
     }
 
+    /// Returns the density of a point of a light that the trees have chosen.
+    pub(crate) fn density_within(&self, at: &Viewpoint<'_>, point: LightPoint, view: &LightView<'_>) -> f64 {
+        let Density { pmf, pdf } = self.trees.density(at, point, view);
+        if pmf > 0.0 { pdf / pmf } else { 0.0 }
+    }
+
     /// Returns the probability of a light by the trees, or the expected number of visits.
     pub(crate) fn pmf(&self, at: &Viewpoint<'_>, leaf: LightLeaf) -> f64 {
         self.shares.trees * self.trees.pmf(at, leaf)

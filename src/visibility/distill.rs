@@ -49,8 +49,8 @@ const LEAST_GAIN: f32 = 5e-4;
 /// Larger: factors of clusters are means over what a larger group of regions asks about. Smaller: over few reports.
 const PRIOR_MASS: f32 = 32.0;
 
-/// Least part of all reports from which on a lane is told apart from its siblings. *Measured* on `building`
-/// (docs/CONSTANTS.md).
+/// Least part of all reports, or of the samples that the table leads to, from which on a lane is told apart from its
+/// siblings. *Measured* on `building` (docs/CONSTANTS.md).
 ///
 /// Larger: faster to publish, and small lights are taken together. Smaller: the reverse.
 const LEAST_MASS: f32 = 2e-4;
@@ -242,7 +242,10 @@ impl Distiller<'_> {
             self.shrink(&mut beliefs, first..last, &counts[counted..end], all, prior);
             (first, counted) = (last, end);
         }
-        beliefs.slots.retain(|belief| belief.mass >= LEAST_MASS);
+        // Lanes that are rarely asked about count if they are most of what gets through.
+        let is_first = |belief: &&Belief| self.parent(key_of(belief.slot)).is_none();
+        let chosen: f32 = beliefs.slots.iter().filter(is_first).map(|belief| belief.mass * belief.factor).sum();
+        beliefs.slots.retain(|belief| belief.mass.max(belief.mass * belief.factor / chosen) >= LEAST_MASS);
         // The factor of a lane is the mean over what is below it, from the leaves upwards.
         let mut end = beliefs.slots.len();
         while end > 0 {

@@ -436,3 +436,44 @@ fn a_table_stays_exact_after_a_refit() {
         }
     }
 }
+
+/// A small opening in front of a large one: what gets through both counts for the small one, whose samples find it.
+#[test]
+fn the_smaller_of_two_portals_along_a_ray_is_preferred() {
+    let window = |z: f32, half: f32| {
+        let (x, y) = (Vec3::X * half, Vec3::Y * half);
+        LightMesh::quad(Vec3::Z * z - x - y, 2.0 * y, 2.0 * x)
+    };
+    let sky = Environment::constant(1.0).expect("a valid radiance");
+    let mut builder = LightSampler::builder().environment(sky);
+    for mesh in [window(1.0, 0.05), window(1.4, 0.7)] {
+        builder.add_mesh(&Mesh::portal(&mesh.positions, &mesh.indices)).expect("valid");
+    }
+    let lights = builder.build().expect("small");
+    let seen = |x: &ShadingPoint, sample: &LightSample| {
+        let place = x.position + sample.direction / sample.direction.z;
+        f32::from(u8::from(place.x.abs().max(place.y.abs()) < 0.05))
+    };
+    let point = |i: u64| {
+        let mut pcg = Pcg32::new(i, 98);
+        ShadingPoint::surface(Vec3::new(pcg.f32() - 0.5, pcg.f32() - 0.5, 0.0), Vec3::Z)
+    };
+    let visibility = Visibility::learn(&lights.as_view(), 8000, point, seen).expect("nobody cancels");
+    let known = lights.with_visibility(&visibility).expect("it was learned here");
+    let (mut pcg, mut reach, mut sums) = (Pcg32::new(11, 97), [0.0; 2], [0.0; 2]);
+    let count = 40_000;
+    for i in 0..count {
+        let (x, u) = (point(i), pcg.cube());
+        for (k, view) in [lights.as_view(), known].iter().enumerate() {
+            let at = view.at(&x);
+            let Some(sample) = at.sample(u) else { continue };
+            let seen = f64::from(seen(&x, &sample));
+            reach[k] += seen / count as f64;
+            sums[k] += seen * f64::from(x.cosine(sample.direction) / at.pdf_sample_direction(&sample));
+        }
+    }
+    // The blind one has a relative standard error of 0.05.
+    assert!((sums[0] / sums[1] - 1.0).abs() < 0.25, "{sums:?}");
+    let [blind, known] = reach;
+    assert!(blind < 0.05 && known > 0.4, "{blind} without, {known} with");
+}

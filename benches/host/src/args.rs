@@ -20,6 +20,7 @@ cargo bench -p fanlight-host --bench host -- [OPTIONS]
   --validate      compares with the references of another renderer instead
   --data DIR      environments and references (FANLIGHT_DATA, or ../shared/data next to the repository)
   --json FILE     writes the figures
+  --figure FILE   draws error against time of all scenes, .svg
   --picture DIR   writes one image of each method";
 
 /// What the user asks for.
@@ -37,6 +38,7 @@ pub(crate) struct Args {
     pub(crate) validate: bool,
     pub(crate) data: PathBuf,
     pub(crate) json: Option<PathBuf>,
+    pub(crate) figure: Option<PathBuf>,
     pub(crate) picture: Option<PathBuf>,
 }
 
@@ -56,6 +58,7 @@ impl Args {
             validate: false,
             data: env::var_os("FANLIGHT_DATA").map_or_else(|| repository.join("../shared/data"), PathBuf::from),
             json: None,
+            figure: None,
             picture: None,
         };
         let mut parser = lexopt::Parser::from_env();
@@ -71,6 +74,7 @@ impl Args {
                 Long("validate") => args.validate = true,
                 Long("data") => args.data = parser.value()?.into(),
                 Long("json") => args.json = Some(parser.value()?.into()),
+                Long("figure") => args.figure = Some(parser.value()?.into()),
                 Long("picture") => args.picture = Some(parser.value()?.into()),
                 // Cargo adds it.
                 Long("bench") => {}

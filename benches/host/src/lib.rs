@@ -8,6 +8,7 @@ mod camera;
 mod clock;
 mod cost;
 mod error;
+mod figure;
 mod file;
 mod film;
 mod geometry;

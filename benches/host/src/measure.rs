@@ -17,6 +17,8 @@ use crate::world::World;
 const LEARNED: [&str; 4] = ["two-rooms", "building", "building-windows", "cornell"];
 /// Rays that it learns by. The time that they take is part of the time of every image.
 const LEARNING_RAYS: u64 = 100_000;
+/// Share of the time from which on errors are noted.
+const CURVE: f64 = 1.0 / 16.0;
 
 /// The image that a method is working on.
 struct Progress {
@@ -24,6 +26,8 @@ struct Progress {
     random: Pcg32,
     /// CPU time that was spent on it.
     seconds: f64,
+    /// Seconds, and the error by then.
+    curve: Vec<[f64; 2]>,
 }
 
 /// What the images of a method came to, one entry a seed.
@@ -32,6 +36,7 @@ struct Outcome {
     samples: Vec<f64>,
     seconds: Vec<f64>,
     errors: Vec<f64>,
+    curves: Vec<Vec<[f64; 2]>>,
 }
 
 /// Renders a scene with all methods and all seeds. Returns one row a method.
@@ -47,11 +52,12 @@ pub(crate) fn measure(
     let costs = cost::measure(world, &methods, bounces);
     let mut outcomes: Vec<Outcome> = methods.iter().map(|_| Outcome::default()).collect();
     for seed in 0..args.seeds {
-        let images = images(world, &methods, bounces, u64::from(seed), args.seconds);
+        let images = images(world, &methods, bounces, u64::from(seed), args.seconds, reference);
         for ((method, outcome), image) in methods.iter().zip(&mut outcomes).zip(&images) {
             outcome.samples.push(f64::from(image.film.samples()));
             outcome.seconds.push(image.seconds);
             outcome.errors.push(reference.rel_mse(&image.film.image()));
+            outcome.curves.push(image.curve.clone());
             if let Some(folder) = args.picture.as_ref().filter(|_| seed == 0) {
                 std::fs::create_dir_all(folder)?;
                 let path = folder.join(format!("{scene}_{bounces}_{}.png", method.name));
@@ -82,6 +88,7 @@ pub(crate) fn measure(
         cost: costs.methods[i],
         ray_ns: costs.ray_ns,
         reference_noise: reference.noise(),
+        curve: outcomes[i].curve(),
     };
     Ok(methods.iter().enumerate().map(row).collect())
 }
@@ -91,13 +98,36 @@ impl Outcome {
     fn products(&self) -> Vec<f64> {
         self.errors.iter().zip(&self.seconds).map(|(error, seconds)| error * seconds).collect()
     }
+
+    /// Returns the geometric means of the curves, as far as all images have them.
+    fn curve(&self) -> Vec<[f64; 2]> {
+        let count = self.curves.iter().map(Vec::len).min().unwrap_or(0);
+        let point = |i: usize| {
+            // Curves end at the same time; some begin later.
+            let points = self.curves.iter().map(|curve| curve[curve.len() - count + i]);
+            let of = |axis: usize| geometric_mean(&points.clone().map(|point| point[axis]).collect::<Vec<_>>());
+            [of(0), of(1)]
+        };
+        (0..count).map(point).collect()
+    }
 }
 
 /// Renders one image with each method. The method that has had the least time has its turn next, so that a machine
 /// whose speed changes treats all alike.
-fn images(world: &World, methods: &[Method], bounces: u32, seed: u64, seconds: f64) -> Vec<Progress> {
-    let start =
-        |i: usize| Progress { film: Film::new(), random: Pcg32::new(seed, i as u64), seconds: methods[i].preparation };
+fn images(
+    world: &World,
+    methods: &[Method],
+    bounces: u32,
+    seed: u64,
+    seconds: f64,
+    reference: &Reference,
+) -> Vec<Progress> {
+    let start = |i: usize| Progress {
+        film: Film::new(),
+        random: Pcg32::new(seed, i as u64),
+        seconds: methods[i].preparation,
+        curve: Vec::new(),
+    };
     let mut images: Vec<Progress> = (0..methods.len()).map(start).collect();
     loop {
         let turn = (0..methods.len()).min_by(|&i, &j| images[i].seconds.total_cmp(&images[j].seconds)).unwrap_or(0);
@@ -108,5 +138,10 @@ fn images(world: &World, methods: &[Method], bounces: u32, seed: u64, seconds: f
         let before = thread_seconds();
         methods[turn].render_pass(world, bounces, &mut image.random, &mut image.film);
         image.seconds += thread_seconds() - before;
+        // Once for each halving of the time.
+        let is_later = image.curve.last().is_none_or(|[last, _]| image.seconds >= 1.9 * last);
+        if image.seconds >= seconds || image.seconds >= CURVE * seconds && is_later {
+            image.curve.push([image.seconds, reference.rel_mse(&image.film.image())]);
+        }
     }
 }

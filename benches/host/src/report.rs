@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use crate::Error;
 use crate::args::Args;
 use crate::cost::Cost;
+use crate::figure;
 use crate::statistics::Ratio;
 
 /// One method in one scene.
@@ -30,6 +31,8 @@ pub(crate) struct Row {
     /// Mean time of a ray.
     pub(crate) ray_ns: f64,
     pub(crate) reference_noise: f64,
+    /// Seconds, and the error of the image by then.
+    pub(crate) curve: Vec<[f64; 2]>,
 }
 
 /// Collects rows and prints them.
@@ -37,6 +40,7 @@ pub(crate) struct Report {
     rows: Vec<Row>,
     skipped: Vec<(String, PathBuf)>,
     json: Option<PathBuf>,
+    figure: Option<PathBuf>,
     is_table: bool,
 }
 
@@ -55,7 +59,8 @@ impl Report {
                 instruction_set()
             );
         }
-        Self { rows: Vec::new(), skipped: Vec::new(), json: args.json.clone(), is_table }
+        let (json, figure) = (args.json.clone(), args.figure.clone());
+        Self { rows: Vec::new(), skipped: Vec::new(), json, figure, is_table }
     }
 
     /// Notes a scene whose data is missing.
@@ -106,6 +111,10 @@ impl Report {
             }))?;
             std::fs::write(path, text + "\n").map_err(|error| format!("cannot write {}: {error}", path.display()))?;
         }
+        if let Some(path) = &self.figure {
+            std::fs::write(path, figure::draw(&self.rows))
+                .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+        }
         Ok(())
     }
 
@@ -148,6 +157,7 @@ impl Row {
             "call_ns_all": self.cost.ns,
             "ray_ns": self.ray_ns,
             "reference_noise": self.reference_noise,
+            "curve": self.curve,
         })
     }
 }

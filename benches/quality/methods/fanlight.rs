@@ -53,6 +53,21 @@ impl Fanlight<'_> {
         &self.sampler
     }
 
+    /// One of several samples, chosen by a target per solid angle, and its contribution weight. No ray may cross
+    /// several portals.
+    pub(crate) fn resampled(
+        &self,
+        x: &ShadingPoint,
+        numbers: &[[f32; 3]],
+        choice: f32,
+        target: impl Fn(&Drawn) -> f64,
+    ) -> Option<(Drawn, f64)> {
+        assert!(!self.layered, "the density of a point is that of its direction");
+        let target = |sample: &LightSample| target(&self.drawn(sample, sample.pdf)) as f32;
+        let chosen = self.sampler.at(x).sample_resampled(numbers, choice, target)?;
+        Some((self.drawn(&chosen.sample, chosen.sample.pdf), f64::from(chosen.weight)))
+    }
+
     /// A sample as all methods return it.
     #[inline]
     pub(crate) fn drawn(&self, sample: &LightSample, pdf: f32) -> Drawn {

@@ -2,12 +2,17 @@
 //! alone is sampled, and if both are, weighted by the balance heuristic.
 //!
 //! The receiver reflects `kd cos θ / π + ks D G / (4 cos θo)`, GGX with height-correlated masking and without Fresnel.
+//! A brushed one has a roughness along a tangent and another across. A rough pane reflects a tenth, and the rest of the
+//! lobe is mirrored to its other side.
+//!
+//! `resampled-8` is what a host does whose BSDF the crate does not know: a pair whose light sample is one of eight
+//! blind ones, chosen by what it brings.
 //! Emitters do not cover each other: a ray sees all that it crosses.
 
 use core::f64::consts::{FRAC_1_PI, PI, TAU};
 
-use ::fanlight::{Glossy, Receiver, ShadingPoint};
-use glam::{DMat3, DVec3};
+use ::fanlight::{Glossy, Microfacet, Receiver, ShadingPoint};
+use glam::{DMat3, DVec3, Vec3};
 
 use crate::args::Args;
 use crate::methods::{Drawn, Fanlight, Method, barycentrics, crosses};
@@ -23,7 +28,18 @@ const WORKLOADS: [(&str, &str, &[f64], &[f64]); 3] = [
     ("window", "lobe-window", &[0.05, 0.1, 0.2, 0.4], &[0.0]),
     ("quad", "lobe-quad", &[0.05, 0.1, 0.2, 0.4], &[0.0]),
 ];
-const METHODS: [&str; 5] = ["light", "light@lobe", "bsdf", "pair", "pair@lobe"];
+/// The same with other microfacets: scene, name, roughness along the tangent and across, and what is transmitted.
+const MICROFACETS: [(&str, &str, [f64; 2], f64); 6] = [
+    ("cloud-10000", "lobe-brushed-0.05-0.2", [0.05, 0.2], 0.0),
+    ("cloud-10000", "lobe-brushed-0.1-0.4", [0.1, 0.4], 0.0),
+    ("cloud-10000", "lobe-pane-0.1", [0.1, 0.1], 0.9),
+    ("cloud-10000", "lobe-pane-0.3", [0.3, 0.3], 0.9),
+    ("quad", "lobe-quad-brushed-0.05-0.2", [0.05, 0.2], 0.0),
+    ("quad", "lobe-quad-pane-0.1", [0.1, 0.1], 0.9),
+];
+const METHODS: [&str; 6] = ["light", "light@lobe", "bsdf", "pair", "pair@lobe", "resampled-8"];
+/// Candidates of the last one.
+const CANDIDATES: usize = 8;
 
 /// What the receiver reflects.
 struct Lobe {
@@ -31,41 +47,78 @@ struct Lobe {
     frame: DMat3,
     /// Outgoing direction in the frame.
     outgoing: DVec3,
-    alpha: f64,
+    look: Look,
+}
+
+/// What a receiver is made of.
+#[derive(Clone, Copy)]
+struct Look {
+    /// Roughness along the tangent and across.
+    alpha: [f64; 2],
     diffuse: f64,
+    /// Share of the lobe that is mirrored to the other side.
+    transmitted: f64,
+}
+
+impl Look {
+    /// A point without the lobe, and with it.
+    fn points(self, position: Vec3, normal: Vec3, outgoing: DVec3, tangent: DVec3) -> [ShadingPoint; 2] {
+        let Self { alpha: [x, y], diffuse, transmitted } = self;
+        let outgoing = outgoing.as_vec3();
+        let share = 1.0 - diffuse;
+        if x == y && transmitted == 0.0 {
+            let glossy = Glossy::new(normal, outgoing, x as f32).with_weights(diffuse as f32, share as f32);
+            return [ShadingPoint::surface(position, normal), ShadingPoint::glossy(position, glossy)];
+        }
+        let shares = [diffuse, share * (1.0 - transmitted), share * transmitted].map(|share| share as f32);
+        let facets = Microfacet::new(normal, outgoing, x as f32).anisotropic(tangent.as_vec3(), [x as f32, y as f32]);
+        let facets = facets.with_weights(shares[0], shares[1], shares[2]);
+        let blind = if transmitted > 0.0 { ShadingPoint::transmissive } else { ShadingPoint::surface };
+        [blind(position, normal), ShadingPoint::microfacet(position, facets)]
+    }
+
+    /// The stretch from the hemisphere to the microfacets.
+    fn stretch(&self) -> DVec3 {
+        DVec3::new(self.alpha[0], self.alpha[1], 1.0)
+    }
 }
 
 impl Lobe {
-    fn lambda(&self, cosine: f64) -> f64 {
-        let tangent2 = (1.0 - cosine * cosine).max(0.0) / (cosine * cosine);
-        0.5 * ((1.0 + self.alpha * self.alpha * tangent2).sqrt() - 1.0)
+    /// Smith's Λ of a direction in the frame.
+    fn lambda(&self, direction: DVec3) -> f64 {
+        let across = (direction * self.look.stretch()).truncate().length_squared();
+        0.5 * ((1.0 + across / (direction.z * direction.z)).sqrt() - 1.0)
     }
 
-    /// Reflected share of the radiance from a direction above the surface, and the density of [`Self::sample`]; the
-    /// part that both have in common.
+    /// Scattered share of the radiance from a direction, and the density of [`Self::sample`].
     fn value_and_pdf(&self, direction: DVec3) -> (f64, f64) {
         let direction = self.frame.transpose() * direction;
-        if direction.z <= 0.0 {
+        let Look { alpha: [x, y], diffuse, transmitted } = self.look;
+        let (above, diffuse, share) = if direction.z > 0.0 {
+            (direction, diffuse * direction.z * FRAC_1_PI, (1.0 - diffuse) * (1.0 - transmitted))
+        } else {
+            (direction * DVec3::new(1.0, 1.0, -1.0), 0.0, (1.0 - diffuse) * transmitted)
+        };
+        if above.z <= 0.0 || share == 0.0 && diffuse == 0.0 {
             return (0.0, 0.0);
         }
-        let h = (direction + self.outgoing).normalize();
-        let alpha2 = self.alpha * self.alpha;
-        let tail = h.x * h.x + h.y * h.y + alpha2 * h.z * h.z;
-        let distribution = alpha2 / (PI * tail * tail) / (4.0 * self.outgoing.z);
-        let (of_o, of_i) = (self.lambda(self.outgoing.z), self.lambda(direction.z));
-        let (diffuse, glossy) = (self.diffuse * direction.z * FRAC_1_PI, (1.0 - self.diffuse) * distribution);
+        let h = (above + self.outgoing).normalize();
+        let tail = (h.x / x).powi(2) + (h.y / y).powi(2) + h.z * h.z;
+        let distribution = 1.0 / (PI * x * y * tail * tail) / (4.0 * self.outgoing.z);
+        let (of_o, of_i) = (self.lambda(self.outgoing), self.lambda(above));
+        let glossy = share * distribution;
         (diffuse + glossy / (1.0 + of_o + of_i), diffuse + glossy / (1.0 + of_o))
     }
 
     /// Draws a direction, through a visible normal (Heitz 2018) or in proportion to the cosine.
     fn sample(&self, pcg: &mut Pcg32) -> DVec3 {
-        let (is_diffuse, u, v) = (pcg.f() < self.diffuse, pcg.f(), pcg.f());
+        let (choice, u, v) = (pcg.f(), pcg.f(), pcg.f());
         let (sin, cos) = (TAU * v).sin_cos();
         let (x, y) = (u.sqrt() * cos, u.sqrt() * sin);
-        if is_diffuse {
+        if choice < self.look.diffuse {
             return self.frame * DVec3::new(x, y, (1.0 - u).max(0.0).sqrt());
         }
-        let stretch = DVec3::new(self.alpha, self.alpha, 1.0);
+        let stretch = self.look.stretch();
         let view = (self.outgoing * stretch).normalize();
         let (s, t) = view.any_orthonormal_pair();
         // `t` along the projection of the normal, as the disk is squeezed there.
@@ -74,8 +127,14 @@ impl Lobe {
         let share = 0.5 * (1.0 + view.z);
         let y = (1.0 - share) * (1.0 - x * x).max(0.0).sqrt() + share * y;
         let normal = s * x + t * y + view * (1.0 - x * x - y * y).max(0.0).sqrt();
-        let normal = (normal * DVec3::new(self.alpha, self.alpha, 1.0)).normalize();
-        self.frame * (2.0 * normal.dot(self.outgoing) * normal - self.outgoing)
+        let normal = (normal * stretch).normalize();
+        let mirrored = 2.0 * normal.dot(self.outgoing) * normal - self.outgoing;
+        if mirrored.z <= 0.0 {
+            // Neither side scatters it.
+            return DVec3::ZERO;
+        }
+        let is_transmitted = choice > 1.0 - (1.0 - self.look.diffuse) * self.look.transmitted;
+        self.frame * mirrored.with_z(if is_transmitted { -mirrored.z } else { mirrored.z })
     }
 }
 
@@ -107,20 +166,27 @@ pub(crate) fn run(args: &Args) -> Vec<LobeRow> {
             let workload =
                 if scene == "cloud-10000" { format!("{name}-{alpha}-{diffuse}") } else { format!("{name}-{alpha}") };
             if args.wants(&workload) || args.wants(scene) {
-                rows.extend(workload_rows(&workload, &scenes::scene(scene), [alpha, diffuse], args));
+                let look = Look { alpha: [alpha; 2], diffuse, transmitted: 0.0 };
+                rows.extend(workload_rows(&workload, &scenes::scene(scene), look, args));
             }
+        }
+    }
+    for (scene, workload, alpha, transmitted) in MICROFACETS {
+        if args.wants(workload) || args.wants(scene) {
+            let look = Look { alpha, diffuse: 0.0, transmitted };
+            rows.extend(workload_rows(workload, &scenes::scene(scene), look, args));
         }
     }
     rows
 }
 
-fn workload_rows(workload: &str, scene: &Scene, [alpha, diffuse]: [f64; 2], args: &Args) -> Vec<LobeRow> {
+fn workload_rows(workload: &str, scene: &Scene, look: Look, args: &Args) -> Vec<LobeRow> {
     let method = Fanlight::new(scene);
     let mut pcg = Pcg32::new(34, 2);
     let points: Vec<_> = scene.points.quality(args.effort.points).into_iter().map(|x| (x, pcg.direction())).collect();
     let at_point = |i: usize, (x, outgoing): &(ShadingPoint, DVec3)| {
         let mut pcg = Pcg32::new(i as u64, 9);
-        View::new(scene, &method, x, *outgoing, [alpha, diffuse]).measure(args.effort.samples, &mut pcg)
+        View::new(scene, &method, x, *outgoing, look).measure(args.effort.samples, &mut pcg, i as u64)
     };
     let measured: Vec<_> = parallel(&points, at_point).into_iter().flatten().collect();
     let mut rows = vec![];
@@ -134,13 +200,7 @@ fn workload_rows(workload: &str, scene: &Scene, [alpha, diffuse]: [f64; 2], args
 }
 
 impl<'a> View<'a> {
-    fn new(
-        scene: &'a Scene,
-        method: &'a Fanlight<'a>,
-        x: &ShadingPoint,
-        outgoing: DVec3,
-        [alpha, diffuse]: [f64; 2],
-    ) -> Self {
+    fn new(scene: &'a Scene, method: &'a Fanlight<'a>, x: &ShadingPoint, outgoing: DVec3, look: Look) -> Self {
         let Receiver::Surface(normal) = x.receiver else { panic!("all workloads have opaque surfaces") };
         let relative = |l: usize| (l, scene.lights[l].vertices.map(|v| v - x.position.as_dvec3()));
         let is_front =
@@ -148,19 +208,19 @@ impl<'a> View<'a> {
         let lights: Vec<_> = (0..scene.lights.len()).map(relative).filter(is_front).collect();
         let n = normal.as_dvec3().normalize();
         let outgoing = if outgoing.dot(n) < 0.0 { -outgoing } else { outgoing };
-        let glossy =
-            Glossy::new(normal, outgoing.as_vec3(), alpha as f32).with_weights(diffuse as f32, (1.0 - diffuse) as f32);
         let (s, t) = n.any_orthonormal_pair();
         let frame = DMat3::from_cols(s, t, n);
-        let lobe = Lobe { frame, outgoing: frame.transpose() * outgoing, alpha, diffuse };
-        Self { scene, method, points: [*x, ShadingPoint::glossy(x.position, glossy)], lobe, lights }
+        let points = look.points(x.position, normal, outgoing, s);
+        let lobe = Lobe { frame, outgoing: frame.transpose() * outgoing, look };
+        Self { scene, method, points, lobe, lights }
     }
 
     /// Variances of all methods, and the squared mean. `None` where nothing arrives.
-    fn measure(&self, samples: usize, pcg: &mut Pcg32) -> Option<([f64; 5], f64)> {
+    fn measure(&self, samples: usize, pcg: &mut Pcg32, point: u64) -> Option<([f64; 6], f64)> {
         // Second moments of light sampling, by samples of lights and of the lobe together, and the halves of pairs.
         let mut of_light = [0.0; 2];
         let (mut halves, mut of_lobe) = ([[Moments::default(); 2]; 2], 0.0);
+        let (mut resampled, mut candidates) = (Moments::default(), Pcg32::new(point, 10));
         for _ in 0..samples {
             for (k, x) in self.points.iter().enumerate() {
                 let mut estimate = 0.0;
@@ -172,6 +232,7 @@ impl<'a> View<'a> {
                 }
                 halves[k][0].add(estimate);
             }
+            resampled.add(self.resample(&mut candidates));
             let direction = self.lobe.sample(pcg);
             let (value, pdf) = self.lobe.value_and_pdf(direction);
             let (mut estimates, mut seen) = ([0.0; 2], 0.0);
@@ -195,8 +256,21 @@ impl<'a> View<'a> {
         let mean = (halves[1][0].sum + halves[1][1].sum) / count;
         let e2 = mean * mean;
         let pair = |k: usize| 2.0 * (halves[k][0].variance() + halves[k][1].variance());
-        let variances = [of_light[0] / count - e2, of_light[1] / count - e2, of_lobe / count - e2, pair(0), pair(1)];
+        let resampled = 2.0 * (resampled.variance() + halves[0][1].variance());
+        let [blind, known] = of_light.map(|moment| moment / count - e2);
+        let variances = [blind, known, of_lobe / count - e2, pair(0), pair(1), resampled];
         (mean > 0.0).then_some((variances.map(|v| v.max(0.0)), e2))
+    }
+
+    /// The half of a pair that one of several samples without the lobe brings.
+    fn resample(&self, pcg: &mut Pcg32) -> f64 {
+        let numbers: [[f32; 3]; CANDIDATES] = core::array::from_fn(|_| pcg.uniform3());
+        let half = |drawn: &Drawn| {
+            let (value, pdf) = self.lobe.value_and_pdf(drawn.direction.as_dvec3());
+            self.weight(drawn) * value * drawn.pdf / (drawn.pdf + pdf)
+        };
+        let chosen = self.method.resampled(&self.points[0], &numbers, pcg.f() as f32, half);
+        chosen.map_or(0.0, |(drawn, weight)| half(&drawn) * weight)
     }
 
     /// Radiance from a point of a light.

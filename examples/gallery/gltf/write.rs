@@ -111,6 +111,7 @@ fn material(material: &Material) -> Value {
     let (metallic, roughness, transmission) = match material.lobe {
         Lobe::Diffuse => (0.0, 1.0, 0.0),
         Lobe::Glossy(exponent) => (1.0, (2.0 / (exponent + 2.0)).powf(0.25), 0.0),
+        Lobe::Rough(alpha) => (1.0, alpha.sqrt(), 0.0),
         Lobe::Clear => (0.0, 0.0, 1.0),
         Lobe::Translucent(share) => (0.0, 1.0, share),
     };

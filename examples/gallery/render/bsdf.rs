@@ -1,9 +1,10 @@
-//! How a surface scatters light: Lambert's lobe on both sides, and Phong's on one.
+//! How a surface scatters light: Lambert's lobe on both sides, and Phong's or that of microfacets on one.
 
 use core::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::{Vec2, Vec3};
 
+use super::facets::Facets;
 use super::material::Lobe;
 use super::sky::LUMINANCE;
 
@@ -14,6 +15,8 @@ pub(crate) struct Bsdf {
     transmitted: Vec3,
     glossy: Vec3,
     exponent: f32,
+    /// What takes the place of Phong's lobe, if anything does.
+    facets: Option<Facets>,
     /// To the side of the outgoing direction.
     normal: Vec3,
     mirror: Vec3,
@@ -25,21 +28,29 @@ impl Bsdf {
     /// The scattering towards `outgoing`, which is on the side of the normal.
     pub(crate) fn new(lobe: Lobe, color: Vec3, normal: Vec3, outgoing: Vec3) -> Self {
         let (mut reflected, mut transmitted, mut glossy, mut exponent) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, 0.0);
+        let mut facets = None;
         match lobe {
             Lobe::Diffuse => reflected = color,
             Lobe::Clear => {}
             Lobe::Translucent(share) => (reflected, transmitted) = ((1.0 - share) * color, share * color),
             Lobe::Glossy(sharpness) => (glossy, exponent) = (color, sharpness),
+            Lobe::Rough(alpha) => (glossy, facets) = (color, Some(Facets::new(alpha, normal, outgoing))),
         }
         let weights = [reflected, transmitted, glossy].map(|color| color.dot(LUMINANCE));
         let sum = weights.iter().sum::<f32>().max(f32::MIN_POSITIVE);
         let mirror = 2.0 * normal.dot(outgoing) * normal - outgoing;
-        Self { reflected, transmitted, glossy, exponent, normal, mirror, shares: weights.map(|weight| weight / sum) }
+        let shares = weights.map(|weight| weight / sum);
+        Self { reflected, transmitted, glossy, exponent, facets, normal, mirror, shares }
     }
 
     /// To the side of the outgoing direction.
     pub(crate) const fn normal(&self) -> Vec3 {
         self.normal
+    }
+
+    /// The microfacets, if there are any.
+    pub(super) const fn facets(&self) -> Option<&Facets> {
+        self.facets.as_ref()
     }
 
     /// Whether light comes through from behind.
@@ -53,9 +64,10 @@ impl Bsdf {
         if cosine <= 0.0 {
             return -cosine * FRAC_1_PI * self.transmitted;
         }
-        let glossy = match self.shares[2] {
-            0.0 => Vec3::ZERO,
-            _ => self.glossy * ((self.exponent + 2.0) / TAU * self.phong(incoming)),
+        let glossy = match (self.shares[2], &self.facets) {
+            (0.0, _) => Vec3::ZERO,
+            (_, Some(facets)) => return self.glossy * facets.value(incoming),
+            (_, None) => self.glossy * ((self.exponent + 2.0) / TAU * self.phong(incoming)),
         };
         cosine * (FRAC_1_PI * self.reflected + glossy)
     }
@@ -67,6 +79,8 @@ impl Bsdf {
             around(self.normal, u.sqrt(), v)
         } else if choice < reflected + transmitted {
             around(-self.normal, u.sqrt(), v)
+        } else if let Some(facets) = &self.facets {
+            facets.sample(u, v)
         } else {
             around(self.mirror, u.powf(1.0 / (self.exponent + 1.0)), v)
         }
@@ -76,9 +90,11 @@ impl Bsdf {
     pub(crate) fn pdf(&self, incoming: Vec3) -> f32 {
         let cosine = self.normal.dot(incoming);
         let diffuse = if cosine > 0.0 { self.shares[0] } else { self.shares[1] };
-        let glossy = match self.shares[2] {
-            0.0 => 0.0,
-            share => share * (self.exponent + 1.0) / TAU * self.phong(incoming),
+        let glossy = match (self.shares[2], &self.facets) {
+            (0.0, _) => 0.0,
+            (_, Some(_)) if cosine <= 0.0 => 0.0,
+            (share, Some(facets)) => share * facets.pdf(incoming),
+            (share, None) => share * (self.exponent + 1.0) / TAU * self.phong(incoming),
         };
         diffuse * cosine.abs() * FRAC_1_PI + glossy
     }

@@ -5,7 +5,7 @@ pub(crate) use fanlight::{Filter, Illumination, Wrap};
 
 use fanlight::{
     DistantLight, Emission, LightSample, LightSampler, LightSamplerBuilder, Mesh, PointLight, PointSampler, ProfileId,
-    ProfileLight, RaySegment, SampledLight, ShadingPoint, Sides, SphereLight, SpotLight,
+    ProfileLight, RaySegment, SampledLight, ShadingPoint, Sides, SphereLight, SpotLight, Visibility,
 };
 use glam::Vec3;
 
@@ -13,13 +13,19 @@ use super::Error;
 use super::alloc::collections::{BTreeMap, BTreeSet};
 use super::alloc::sync::Arc;
 use super::bsdf::Bsdf;
+use super::camera::Camera;
 use super::lamp::{Diagram, Lamp, LampKind};
 use super::material::{Lobe, Material};
 use super::model::Model;
+use super::random::Random;
 use super::scene::Point;
 use super::sky::LUMINANCE;
 use super::sources::{Meshes, Passed, Sources};
 use super::weights::{clear, colored, emission, environment};
+use super::world::World;
+
+/// Which random numbers points are drawn with that visibility is learned at.
+const LEARNING: u64 = 99;
 
 /// A direction worth tracing.
 pub(crate) struct Proposal {
@@ -52,36 +58,26 @@ pub(crate) struct Lights {
     knows_hits: bool,
     /// Whether the sky is one of the lights, and all that rays find which leave the scene.
     open_sky: bool,
+    /// Whether the lobes of rough mirrors are told.
+    tells_lobes: bool,
+    /// What walls hide, if that has been learned.
+    visibility: Option<Visibility>,
 }
 
 impl Lights {
     /// Hands over all that emits light or lets it in.
     pub(crate) fn new(model: &Model, illumination: Illumination) -> Result<Self, Error> {
-        Self::weighted(model, illumination, |_| 1.0)
-    }
-
-    /// The same with each portal's weight, by its number, times a factor.
-    pub(crate) fn weighted(
-        model: &Model,
-        illumination: Illumination,
-        factor: impl Fn(usize) -> f32,
-    ) -> Result<Self, Error> {
-        Self::build(model, illumination, factor, false)
+        Self::build(model, illumination, false)
     }
 
     /// The same with the sky as one more light where no portal leads to it.
     pub(crate) fn plain(model: &Model) -> Result<Self, Error> {
         let is_portal = |mesh: &super::mesh::Mesh| model.is_portal(mesh) && model.materials[mesh.material].has_holes();
         let open_sky = model.sky.is_some() && !model.meshes.iter().any(is_portal);
-        Self::build(model, Illumination::default(), |_| 1.0, open_sky)
+        Self::build(model, Illumination::default(), open_sky)
     }
 
-    fn build(
-        model: &Model,
-        illumination: Illumination,
-        factor: impl Fn(usize) -> f32,
-        open_sky: bool,
-    ) -> Result<Self, Error> {
+    fn build(model: &Model, illumination: Illumination, open_sky: bool) -> Result<Self, Error> {
         let material = |mesh: &super::mesh::Mesh| &model.materials[mesh.material];
         let firsts =
             model.meshes.iter().scan(0, |next, mesh| Some(core::mem::replace(next, *next + mesh.indices.len())));
@@ -94,11 +90,7 @@ impl Lights {
         let used: BTreeSet<_> = emitters.iter().map(|(mesh, _)| mesh.material).collect();
         let emission: BTreeMap<_, _> =
             used.into_iter().map(|number| (number, emission(model, &model.materials[number]))).collect();
-        let factor_of = |(i, mesh): (usize, &&super::mesh::Mesh)| match meshes.shared(mesh) {
-            None => clear(model, material(mesh)).times(factor(i)),
-            Some(_) => clear(model, material(mesh)),
-        };
-        let transmission: Vec<_> = portals.iter().enumerate().map(factor_of).collect();
+        let transmission: Vec<_> = portals.iter().map(|mesh| clear(model, material(mesh))).collect();
         let mut builder = LightSampler::builder().illumination(illumination).environment(environment(model)?);
         if open_sky {
             builder = builder.environment_as_light();
@@ -128,14 +120,44 @@ impl Lights {
                 Mesh::emitter(&mesh.positions, &mesh.indices).uvs(mesh.emission_uvs()).sides(sides).weight(weight)
             })?;
         }
-        for (i, (mesh, weight)) in portals.into_iter().zip(&transmission).enumerate() {
+        for (mesh, weight) in portals.into_iter().zip(&transmission) {
             let (sides, weight) = (sides(material(mesh)), weight.weight(&mut builder)?);
-            meshes.add_portal(&mut builder, mesh, factor(i), &|mesh| {
+            meshes.add_portal(&mut builder, mesh, &|mesh| {
                 Mesh::portal(&mesh.positions, &mesh.indices).uvs(&mesh.uvs).sides(sides).weight(weight)
             })?;
         }
         let (sources, passed) = meshes.finish();
-        Ok(Self { sources, passed, knows_hits, open_sky, sampler: builder.build()? })
+        let sampler = builder.build()?;
+        Ok(Self { sources, passed, knows_hits, open_sky, sampler, tells_lobes: true, visibility: None })
+    }
+
+    /// The same with every surface taken for a diffuse one.
+    pub(crate) fn without_lobes(self) -> Self {
+        Self { tells_lobes: false, ..self }
+    }
+
+    /// The same with what walls hide from the surfaces that a camera sees, learned by so many rays.
+    pub(crate) fn learned(mut self, world: &World, camera: &Camera, rays: u64) -> Result<Self, Error> {
+        let point = |i: u64| {
+            let mut random = Random::new(i, LEARNING);
+            let [u, v]: [f32; 2] = random.take();
+            let pixel = glam::vec2(u * camera.width() as f32, v * camera.height() as f32);
+            let (origin, direction) = camera.ray(pixel);
+            world.trace(origin, direction).1.map_or(ShadingPoint::volume(Vec3::NAN), |point| {
+                self.shading_point(point.start(point.normal), &world.bsdf(&point, direction))
+            })
+        };
+        let passed = |x: &ShadingPoint, sample: &LightSample| {
+            let is_emitter = sample.hit().is_some_and(|hit| self.sources.emits(&hit));
+            let passed = if is_emitter {
+                world.passes(x.position, sample.position)
+            } else {
+                world.scene.passes(x.position, sample.direction, f32::INFINITY)
+            };
+            LUMINANCE.dot(passed)
+        };
+        self.visibility = Some(Visibility::learn(&self.sampler.as_view(), rays, point, passed)?);
+        Ok(self)
     }
 
     /// What was passed in, and the memory that it takes.
@@ -170,12 +192,12 @@ impl Lights {
 
     /// The lights as seen from a point of a surface.
     pub(crate) fn at_surface(&self, position: Vec3, bsdf: &Bsdf) -> LightsAt<'_> {
-        LightsAt(self.sampler.at(&surface(position, bsdf)))
+        LightsAt(self.at(&self.shading_point(position, bsdf)))
     }
 
     /// The lights as seen from a point in fog.
     pub(crate) fn at_volume(&self, position: Vec3) -> LightsAt<'_> {
-        LightsAt(self.sampler.at(&ShadingPoint::volume(position)))
+        LightsAt(self.at(&ShadingPoint::volume(position)))
     }
 
     /// A distance along a stretch of a ray in fog of this density, by the light that is expected there, and its density
@@ -193,14 +215,24 @@ impl Lights {
 
     /// One direction to a light and its density, for a point of a surface.
     pub(crate) fn propose(&self, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<Proposal> {
-        LightsAt(self.sampler.at(&ShadingPoint::surface(position, normal))).sample(u)
+        LightsAt(self.at(&ShadingPoint::surface(position, normal))).sample(u)
     }
 
-    /// A portal's number and a direction through it, as drawn for a point of a surface.
-    pub(crate) fn sample_portal(&self, position: Vec3, normal: Vec3, u: [f32; 3]) -> Option<(usize, Vec3)> {
-        let sample = self.sampler.at(&ShadingPoint::surface(position, normal)).sample(u)?;
-        let portal = sample.hit()?.triangle.mesh.index().checked_sub(self.sources.emitting_meshes())?;
-        Some((portal as usize, sample.direction))
+    /// The sampler for a point, with what has been learned.
+    fn at(&self, x: &ShadingPoint) -> PointSampler<'_> {
+        let known = self.visibility.as_ref().and_then(|visibility| self.sampler.with_visibility(visibility).ok());
+        match known {
+            Some(lights) => lights.at(x),
+            None => self.sampler.at(x),
+        }
+    }
+
+    /// What `fanlight` is told of a point of a surface.
+    fn shading_point(&self, position: Vec3, bsdf: &Bsdf) -> ShadingPoint {
+        match bsdf.facets() {
+            Some(facets) if self.tells_lobes => ShadingPoint::glossy(position, facets.glossy()),
+            _ => surface(position, bsdf),
+        }
     }
 
     /// Light as it leaves emitters, or comes in through portals.

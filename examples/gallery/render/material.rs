@@ -15,6 +15,8 @@ pub(crate) enum Lobe {
     Translucent(f32),
     /// Reflects it around the mirror direction, the closer the larger the exponent (Phong's lobe).
     Glossy(f32),
+    /// Reflects it by microfacets of this roughness (GGX).
+    Rough(f32),
 }
 
 /// A material. Images are numbers into the model's list.

@@ -12,6 +12,7 @@ mod bsdf;
 mod camera;
 #[path = "../../room/render/daylight.rs"]
 mod daylight;
+mod facets;
 #[path = "../../room/render/file.rs"]
 mod file;
 #[path = "../../room/render/film.rs"]

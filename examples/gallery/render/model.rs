@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::bitmap::Bitmap;
 use super::camera::Camera;
 use super::lamp::Lamp;
-use super::material::Material;
+use super::material::{Lobe, Material};
 use super::mesh::Mesh;
 use super::sky::Sky;
 
@@ -76,6 +76,11 @@ impl Model {
         let corners = || self.meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
         let (low, high) = (corners().reduce(Vec3::min), corners().reduce(Vec3::max));
         low.zip(high).map_or(1.0, |(low, high)| (high - low).length())
+    }
+
+    /// Whether there are rough mirrors.
+    pub(crate) fn has_rough(&self) -> bool {
+        self.materials.iter().any(|material| matches!(material.lobe, Lobe::Rough(_)))
     }
 
     /// Whether a mesh was flagged as a portal by the name of its material, in capitals or not.

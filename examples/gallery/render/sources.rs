@@ -47,11 +47,6 @@ impl Sources {
         let [meshes, instances] = self.emitting;
         hit.instance.map_or_else(|| hit.triangle.mesh.index() < meshes, |instance| instance.index() < instances)
     }
-
-    /// How many meshes emit light that are not instances.
-    pub(super) const fn emitting_meshes(&self) -> u32 {
-        self.emitting[0]
-    }
 }
 
 /// A mesh as the sampler wants it.
@@ -77,7 +72,7 @@ impl Meshes {
     }
 
     /// The object that a mesh is copies of, if there are several.
-    pub(super) fn shared<'m>(&self, mesh: &'m Mesh) -> Option<&'m Copies> {
+    fn shared<'m>(&self, mesh: &'m Mesh) -> Option<&'m Copies> {
         let copies = mesh.copies.as_ref()?;
         (self.uses.get(&Arc::as_ptr(&copies.object)).is_some_and(|&uses| uses > 1)).then_some(copies)
     }
@@ -90,20 +85,19 @@ impl Meshes {
         first: usize,
         as_light: AsLight<'_>,
     ) -> Result<(), Error> {
-        self.add(builder, mesh, 1.0, as_light, Some(first))?;
+        self.add(builder, mesh, as_light, Some(first))?;
         self.sources.emitting = self.added;
         Ok(())
     }
 
-    /// Passes in a portal. The weights of copies are multiplied by a factor.
+    /// Passes in a portal.
     pub(super) fn add_portal(
         &mut self,
         builder: &mut LightSamplerBuilder<'_>,
         mesh: &Mesh,
-        factor: f32,
         as_light: AsLight<'_>,
     ) -> Result<(), Error> {
-        self.add(builder, mesh, factor, as_light, None)
+        self.add(builder, mesh, as_light, None)
     }
 
     /// What has been passed in, and how many objects are among it.
@@ -116,7 +110,6 @@ impl Meshes {
         &mut self,
         builder: &mut LightSamplerBuilder<'_>,
         mesh: &Mesh,
-        factor: f32,
         as_light: AsLight<'_>,
         first: Option<usize>,
     ) -> Result<(), Error> {
@@ -132,7 +125,7 @@ impl Meshes {
         for (number, place) in places.iter().enumerate() {
             let first = first.map(|first| first + number * object.indices.len());
             // Some places flatten a mesh so that it cannot be an object.
-            match builder.add_instance(Instance::new(id, *place).scaled(factor)) {
+            match builder.add_instance(Instance::new(id, *place)) {
                 Ok(instance) => {
                     self.added[1] += 1;
                     self.extend(

@@ -4,12 +4,14 @@ use fanlight::ShadingPoint;
 
 use super::Error;
 use super::bsdf::Bsdf;
+use super::camera::Camera;
 use super::lighting::{Guide, Illumination, Lights, LightsAt, PlainAt, Proposal};
 use super::model::Model;
 use super::power_table::PowerTable;
 use super::published::Published;
 use super::scene::Point;
 use super::texel_table::TexelTable;
+use super::world::World;
 
 /// How points on lights are chosen.
 pub(crate) enum LightChoice {
@@ -89,6 +91,16 @@ impl Techniques {
     /// The same with other lights.
     pub(crate) fn with_lights(self, lights: Lights) -> Self {
         Self { lights, ..self }
+    }
+
+    /// The same with every surface taken for a diffuse one where lights are chosen.
+    pub(crate) fn without_lobes(self) -> Self {
+        Self { lights: self.lights.without_lobes(), ..self }
+    }
+
+    /// The same with what walls hide from the surfaces that a camera sees, learned by so many rays.
+    pub(crate) fn learned(self, world: &World, camera: &Camera, rays: u64) -> Result<Self, Error> {
+        Ok(Self { lights: self.lights.learned(world, camera, rays)?, ..self })
     }
 
     /// The lights as seen from a point of a surface, the path's vertex of that number.

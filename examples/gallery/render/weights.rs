@@ -32,12 +32,6 @@ impl<'a> Weights<'a> {
         Self { constant, texels: bitmap.iter().flat_map(|bitmap| bitmap.texels()).map(texel).collect(), bitmap }
     }
 
-    pub(super) fn times(mut self, factor: f32) -> Self {
-        self.constant *= factor;
-        self.texels.iter_mut().for_each(|texel| *texel *= factor);
-        self
-    }
-
     /// The weight of meshes, after the texels have been passed in.
     pub(super) fn weight<'b>(&'b self, builder: &mut LightSamplerBuilder<'b>) -> Result<Weight, Error> {
         Ok(match self.bitmap {

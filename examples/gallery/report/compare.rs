@@ -36,6 +36,8 @@ pub(crate) struct Contestant {
     pub(crate) name: String,
     pub(crate) role: Role,
     pub(crate) techniques: Techniques,
+    /// What it took to learn something before the first sample: it is part of the time of each image.
+    pub(crate) seconds: f64,
 }
 
 /// What came out.
@@ -67,13 +69,14 @@ pub(crate) fn compare(
                 .map(|Contestant { techniques, .. }| PathTracer::new(world, techniques, bounces))
                 .map(|tracer| Progressive { tracer, camera, seed })
                 .collect();
-            with_progress_bar(title, |progress| take_turns(&tracers, effort.budget, progress))
+            let learning: Vec<_> = contestants.iter().map(|contestant| contestant.seconds).collect();
+            with_progress_bar(title, |progress| take_turns(&tracers, &learning, effort.budget, progress))
         })
         .collect();
     let budget = effort.budget.times(REFERENCE_FACTOR * effort.images);
     let tracer = PathTracer::new(world, &best.techniques, bounces);
     let progressive = [Progressive { tracer, camera, seed: !effort.seed }];
-    let reference = with_progress_bar("reference", |progress| take_turns(&progressive, budget, progress));
+    let reference = with_progress_bar("reference", |progress| take_turns(&progressive, &[0.0], budget, progress));
     let reference = Reference::from_film(&reference.first().ok_or("nothing to compare")?.film);
     let tracer = PathTracer::new(world, &best.techniques, 0);
     let seen = Progressive { tracer, camera, seed: effort.seed }.render(SEEN, drop).0.image();
@@ -100,11 +103,13 @@ impl Run {
 }
 
 /// Renders all images at the same time, a sample a pixel of each in turn, so that a machine whose speed changes treats
-/// all alike.
-fn take_turns(tracers: &[Progressive<'_>], budget: Budget, progress: &dyn Fn(f64)) -> Vec<Run> {
-    let empty =
-        |tracer: &Progressive<'_>| Run { film: Film::new(tracer.camera.width(), tracer.camera.height()), seconds: 0.0 };
-    let mut runs: Vec<_> = tracers.iter().map(empty).collect();
+/// all alike. `learning` is what each took before.
+fn take_turns(tracers: &[Progressive<'_>], learning: &[f64], budget: Budget, progress: &dyn Fn(f64)) -> Vec<Run> {
+    let empty = |(tracer, &seconds): (&Progressive<'_>, &f64)| Run {
+        film: Film::new(tracer.camera.width(), tracer.camera.height()),
+        seconds,
+    };
+    let mut runs: Vec<_> = tracers.iter().zip(learning).map(empty).collect();
     loop {
         let spent = |run: &Run| budget.spent(run.seconds, run.film.samples()).min(1.0);
         progress(runs.iter().map(spent).sum::<f64>() / runs.len().max(1) as f64);

@@ -6,6 +6,7 @@ mod picture;
 mod progress;
 mod statistics;
 
+pub(crate) use clock::seconds;
 pub(crate) use compare::{Comparison, Contestant, Effort, Role, compare};
-pub(crate) use picture::{Picture, contact_sheet, save};
+pub(crate) use picture::{Picture, contact_sheet, images_of, save};
 pub(crate) use progress::with_progress_bar;

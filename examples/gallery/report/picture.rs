@@ -15,8 +15,8 @@ const GAP: u32 = 4;
 /// Size and enlargement of the details.
 const DETAIL: (u32, u32) = (44, 33);
 const ENLARGED: u32 = 3;
-/// Size of one image on the contact sheet: half of what is rendered.
-const TILE: (u32, u32) = (104, 78);
+/// Size of one image on the contact sheet: less than half of what is rendered, for a sheet of less than 300 kB.
+const TILE: (u32, u32) = (92, 69);
 
 /// Images of one scene in the same exposure.
 pub(crate) struct Picture {
@@ -54,6 +54,14 @@ impl Picture {
         }
         sheet
     }
+}
+
+/// The two images of a picture that was saved before.
+pub(crate) fn images_of(path: &Path) -> Result<[RgbImage; 2], Error> {
+    let picture = image::open(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?.into_rgb8();
+    let (width, height) = (picture.width().saturating_sub(GAP) / 2, picture.height());
+    let height = height.saturating_sub(GAP + ENLARGED * DETAIL.1);
+    Ok([0, width + GAP].map(|left| imageops::crop_imm(&picture, left, 0, width, height).to_image()))
 }
 
 /// Pairs of pictures with their names, three to a row.

@@ -5,6 +5,7 @@ extern crate alloc;
 mod car;
 mod facade;
 mod fog;
+mod glossy;
 mod glyphs;
 mod lantern;
 mod letters;
@@ -39,7 +40,7 @@ pub(crate) struct Scene {
 }
 
 /// All scenes, in the order of the contact sheet.
-pub(crate) const ALL: [Scene; 11] = [
+pub(crate) const ALL: [Scene; 12] = [
     Scene { name: "room", model: room::room, bounces: &[1, 5], detail: [0.72, 0.8] },
     Scene { name: "car", model: car::car, bounces: &[1, 5], detail: [0.5, 0.62] },
     Scene { name: "lantern", model: lantern::lantern, bounces: &[4], detail: [0.3, 0.75] },
@@ -51,4 +52,5 @@ pub(crate) const ALL: [Scene; 11] = [
     Scene { name: "fog", model: fog::fog, bounces: &[2], detail: [0.5, 0.5] },
     Scene { name: "street", model: street::street, bounces: &[1, 3], detail: [0.35, 0.75] },
     Scene { name: "town", model: town::town, bounces: &[1, 3], detail: [0.35, 0.75] },
+    Scene { name: "glossy", model: glossy::glossy, bounces: &[1, 5], detail: [0.42, 0.75] },
 ];

@@ -41,6 +41,10 @@ pub(crate) fn without_and_with(
         contestant("fanlight", Role::Fanlight, Techniques::plain(model)?),
         contestant("fanlight, sky and rays of light", Role::Extra, Techniques::with_light_rays(model)?),
     ];
+    if model.has_rough() {
+        let blind = Techniques::plain(model)?.without_lobes();
+        contestants.insert(2, contestant("fanlight without lobes", Role::Fanlight, blind));
+    }
     // No ray finds these.
     if !model.lamps.is_empty() {
         contestants.remove(0);
@@ -54,5 +58,5 @@ pub(crate) fn without_and_with(
 }
 
 fn contestant(name: &str, role: Role, techniques: Techniques) -> Contestant {
-    Contestant { name: name.to_owned(), role, techniques }
+    Contestant { name: name.to_owned(), role, techniques, seconds: 0.0 }
 }

@@ -98,6 +98,11 @@ fn town() {
 }
 
 #[test]
+fn glossy() {
+    check("glossy", 2, [600, 80], 0.03);
+}
+
+#[test]
 fn street_in_fog() {
     let without = |model: &render::Model| Techniques::without(model).expect("lights");
     compare_models("fog", scenes::foggy_street(), 1, [600, 100], 0.05, without);
