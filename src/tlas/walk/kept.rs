@@ -29,8 +29,7 @@ struct Kept<const N: usize> {
 impl<const N: usize> Kept<N> {
     #[inline(always)]
     fn none() -> Self {
-        let estimates =
-            [(); MOST_KEPT].map(|()| Estimates::none());
+        let estimates = [(); MOST_KEPT].map(|()| Estimates::none());
         Self { nodes: [0; MOST_KEPT], estimates, len: 0 }
     }
 
