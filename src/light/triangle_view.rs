@@ -276,10 +276,12 @@ impl<'a> TriangleView<'a> {
         if is_even && is_near && !self.draws_uniformly() { ProjectedPart::new(self) } else { None }
     }
 
-    /// Returns how points of a texture are drawn that is near; `None` where they are drawn by cells alone.
+    /// Returns how points of a texture are drawn that is near; `None` where they are drawn by cells alone. Behind a
+    /// portal the cells know the sky, and directions do not.
     #[inline]
     fn near_texture(&self) -> Option<NearTexture> {
-        if self.illumination == Illumination::ClampedVertices { NearTexture::new(self) } else { None }
+        let is_emitter = self.illumination == Illumination::ClampedVertices && self.environment.is_none();
+        if is_emitter { NearTexture::new(self) } else { None }
     }
 
     /// Draws a point by its direction. `None` where there is too little solid angle, and points are drawn by cells.

@@ -230,37 +230,3 @@ fn the_irradiance_is_about_that_of_all_lights() {
     let found = open.at(&ShadingPoint::surface(Vec3::ZERO, Vec3::Y)).irradiance();
     assert!((f64::from(found) / (2.0 * PI) - 1.0).abs() < 0.1, "{found}");
 }
-
-/// A cloud of small triangles at random in the unit cube.
-fn cloud(count: u32) -> LightSampler {
-    let (mut pcg, mut builder) = (Pcg32::new(33, 2), LightSampler::builder());
-    let size = 0.3 / (count as f32).cbrt();
-    for _ in 0..count {
-        let (place, weight) = (vec3(pcg.f32(), pcg.f32(), pcg.f32()), (6.0 * pcg.f32() - 3.0).exp2());
-        let mut corner = || place + size * (2.0 * vec3(pcg.f32(), pcg.f32(), pcg.f32()) - 1.0);
-        let corners = [corner(), corner(), corner()];
-        let mesh = Mesh::emitter(&corners, &[[0, 1, 2]]).weight(Weight::Constant(weight));
-        builder.add_mesh(&mesh).expect("the triangle is sound");
-    }
-    builder.build().expect("the cloud is sound")
-}
-
-/// Where most of what a point receives is in clusters that its horizon crosses, most of them would be chosen in vain.
-#[test]
-fn few_samples_of_a_cloud_choose_nothing() {
-    let sampler = cloud(2000);
-    let mut pcg = Pcg32::new(34, 2);
-    let (mut lit, mut none) = (0, 0.0);
-    for _ in 0..400 {
-        let place = 2.0 * vec3(pcg.f32(), pcg.f32(), pcg.f32()) - 0.5;
-        let at = sampler.at(&ShadingPoint::surface(place, pcg.direction()));
-        let found = (0..100).filter(|_| at.sample([pcg.f32(), pcg.f32(), pcg.f32()]).is_some()).count();
-        if found > 0 {
-            lit += 1;
-            none += 1.0 - found as f64 / 100.0;
-        }
-    }
-    let none = none / f64::from(lit);
-    println!("cloud-2000: {lit} points, none {none:.4}");
-    assert!(none <= 0.03, "{none} choose nothing");
-}

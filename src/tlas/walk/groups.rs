@@ -15,7 +15,6 @@ impl<const N: usize> WideTree<'_, N> {
             if held & groups == 0 {
                 *weight = 0.0;
                 estimates.opened &= !(1 << lane);
-                estimates.around &= !(1 << lane);
             }
             estimates.largest = estimates.largest.max(weight.to_bits());
         }

@@ -9,8 +9,8 @@
 //! ([`Lobe`]).
 //!
 //! Moments say little of what is near the shading point, and one direction says little of a cluster over which a lobe
-//! varies. Such a cluster is opened, which means that the sum of its own children's weights is its weight
-//! ([`opening`](super::opening)). A light near the point is weighed by its exact irradiance.
+//! varies. Such a cluster is opened, which means that the sum of its own children's weights is its weight. A light near
+//! the point is weighed by its exact irradiance.
 
 use glam::Vec3;
 
@@ -140,23 +140,21 @@ pub(super) struct Estimates<const N: usize> {
     pub(super) doubtful: [u32; 2],
     /// A set of bits: nodes near the shading point, or over which the lobe varies, that may send something.
     pub(super) opened: u32,
-    /// A set of bits: nodes among them that are around the shading point.
-    pub(super) around: u32,
-    /// A set of bits: nodes that the horizon crosses, and whose means lie below it.
-    pub(super) unsure: u32,
 }
 
 impl<const N: usize> WideTree<'_, N> {
     /// Returns the weight of every child of a node. All zero where nothing below the node can be visible.
     ///
-    /// A child that is a node itself, and near the shading point, mixed for the lobe or in doubt, is opened: the sum of
-    /// its own children's weights is its weight. Whether it is depends on the shading point alone.
+    /// A child that is a node itself, and near the shading point or mixed for the lobe, is opened: the sum of its own
+    /// children's weights is its weight. That is one level, and depends on the shading point alone.
     #[inline(always)]
     pub(super) fn weights(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> [f32; N] {
         let node = &self.nodes[index];
-        let estimates = self.estimated(index, x, oracle);
-        let mut opened = estimates.opened | estimates.doubted();
-        let Estimates { mut weights, mut largest, .. } = estimates;
+        let mut estimates = node.asked(index, x, oracle);
+        if !self.groups.is_empty() {
+            estimates = self.within_groups(index, oracle.shading_point().groups, estimates);
+        }
+        let Estimates { mut weights, mut largest, mut opened, .. } = estimates;
         if opened != 0 {
             while opened != 0 {
                 let lane = opened.trailing_zeros();
@@ -173,20 +171,15 @@ impl<const N: usize> WideTree<'_, N> {
         weights
     }
 
-    /// Returns the estimates of a node's children before any of them is opened.
+    /// Returns the sum of the weights of a node's children.
     #[inline(always)]
-    pub(super) fn estimated(
-        &self,
-        index: usize,
-        x: &ReceiverLanes<impl Lobe>,
-        oracle: &impl LeafOracle,
-    ) -> Estimates<N> {
-        let estimates = self.nodes[index].asked(index, x, oracle);
-        if self.groups.is_empty() {
-            estimates
-        } else {
-            self.within_groups(index, oracle.shading_point().groups, estimates)
+    fn opened(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> f32 {
+        let mut estimates = self.nodes[index].asked(index, x, oracle);
+        if !self.groups.is_empty() {
+            estimates = self.within_groups(index, oracle.shading_point().groups, estimates);
         }
+        let sum: f32 = estimates.weights.iter().sum();
+        only_if(sum > 0.0, within_range(sum))
     }
 }
 
@@ -271,7 +264,6 @@ impl<const N: usize> Node<N> {
         let (horizon, absolute_horizon, normal) = (x.horizon, x.horizon.abs(), x.normal);
         let mut weights = [0.0; N];
         let (mut largest, mut doubtful, mut near, mut mixed) = (0, 0, 0, 0);
-        let (mut around, mut unsure) = (0, 0);
         for i in 0..N {
             let counts = Vec3::new(f32::from(halves[0][i]), f32::from(halves[1][i]), f32::from(halves[2][i]));
             // A difference, as that of zero is folded away.
@@ -334,13 +326,9 @@ impl<const N: usize> Node<N> {
             doubtful |= u32::from((straddles | averted) & !culled) << i;
             near |= u32::from((radius2 > OPENING * OPENING * distance2) & !culled) << i;
             mixed |= u32::from(is_mixed & !culled) << i;
-            around |= u32::from((radius2 > distance2) & !culled) << i;
-            unsure |= u32::from(straddles & (mean_height < 0.0) & !culled) << i;
         }
         let leaves = self.children() & (u32::MAX << self.node_count);
-        let doubtful = [doubtful & leaves, near & leaves];
-        let opened = (near | mixed) & !leaves;
-        Estimates { weights, largest, doubtful, opened, around: around & !leaves, unsure: unsure & !leaves }
+        Estimates { weights, largest, doubtful: [doubtful & leaves, near & leaves], opened: (near | mixed) & !leaves }
     }
 }
 

@@ -6,11 +6,12 @@
 
 use super::FirstWeights;
 use super::importance::{Estimates, LeafOracle};
+use crate::math::only_if;
 use crate::receiver::{Lobe, ReceiverLanes};
 use crate::simd::Kernel;
 use crate::tlas::node::Child;
 use crate::tlas::tree::WideTree;
-use crate::warp::{Variate, keep_least, pick_wide};
+use crate::warp::{Variate, keep_least, pick_wide, within_range};
 
 /// Most children of a node whose estimates are kept. Affects time alone. *Chosen*: near a plane of lights about three
 /// children of a node are near.
@@ -29,7 +30,8 @@ struct Kept<const N: usize> {
 impl<const N: usize> Kept<N> {
     #[inline(always)]
     fn none() -> Self {
-        let estimates = [(); MOST_KEPT].map(|()| Estimates::none());
+        let estimates =
+            [(); MOST_KEPT].map(|()| Estimates { weights: [0.0; N], largest: 0, doubtful: [0; 2], opened: 0 });
         Self { nodes: [0; MOST_KEPT], estimates, len: 0 }
     }
 
@@ -76,7 +78,7 @@ impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for KeepingWalk<'_, N, S, L>
                     kept.len = 0;
                     let own = match known {
                         Some(estimates) => estimates,
-                        None => tlas.estimated(node as usize, &receiver, oracle),
+                        None => tlas.own_estimates(node as usize, &receiver, oracle),
                     };
                     tlas.opened_weights(node as usize, own, &receiver, oracle, &mut kept)
                 }
@@ -93,6 +95,17 @@ impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for KeepingWalk<'_, N, S, L>
 }
 
 impl<const N: usize> WideTree<'_, N> {
+    /// Returns the estimates of a node's children, of which none is opened yet.
+    #[inline(always)]
+    fn own_estimates(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> Estimates<N> {
+        let estimates = self.nodes[index].asked(index, x, oracle);
+        if self.groups.is_empty() {
+            estimates
+        } else {
+            self.within_groups(index, oracle.shading_point().groups, estimates)
+        }
+    }
+
     /// Returns [`weights`](Self::weights) by the estimates of a node's children, and keeps those of the children that
     /// are opened.
     #[inline(always)]
@@ -105,16 +118,16 @@ impl<const N: usize> WideTree<'_, N> {
         kept: &mut Kept<N>,
     ) -> [f32; N] {
         let first_node = self.nodes[index].first_node;
-        let mut opened = estimates.opened | estimates.doubted();
-        let Estimates { mut weights, mut largest, .. } = estimates;
+        let Estimates { mut weights, mut largest, mut opened, .. } = estimates;
         if opened != 0 {
             while opened != 0 {
                 let lane = opened.trailing_zeros();
                 opened &= opened - 1;
                 let child = first_node.wrapping_add(lane);
-                let below = self.estimated(child as usize, x, oracle);
+                let below = self.own_estimates(child as usize, x, oracle);
                 kept.keep(child, &below);
-                let sum = self.opened_from(child as usize, below, x, oracle);
+                let sum: f32 = below.weights.iter().sum();
+                let sum = only_if(sum > 0.0, within_range(sum));
                 let is_known = oracle.has_factors();
                 weights[lane as usize] =
                     if is_known { self.inherited(index, lane, child as usize, oracle, sum) } else { sum };

@@ -9,7 +9,6 @@ mod groups;
 mod importance;
 mod kept;
 mod learned;
-mod opening;
 pub(in crate::tlas) mod ray;
 mod segment;
 mod shaped;

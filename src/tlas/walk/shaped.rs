@@ -65,7 +65,6 @@ impl<const N: usize> Node<N> {
             estimates.weights[lane] = 0.0;
             estimates.doubtful.iter_mut().for_each(|set| *set &= !bit);
             estimates.opened &= !bit;
-            estimates.around &= !bit;
         } else if let (Child::Leaf(_), true) = (self.child(lane), estimates.weights[lane] > 0.0) {
             // Inside of the cone and outside, by its own falloff.
             estimates.doubtful.iter_mut().for_each(|set| *set |= bit);
