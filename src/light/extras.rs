@@ -1,7 +1,8 @@
 //! What few scenes have: light groups, profiles, distant lights and motion, in one buffer, so that all others carry one
 //! slice more.
 //!
-//! The buffer is empty where a scene has none of them. Otherwise it is a [`Header`] and then the arrays that it counts.
+//! The buffer is empty where a scene has none of them. Otherwise it is an [`ExtrasHeader`], and then the arrays that it
+//! counts.
 
 use alloc::vec::Vec;
 
@@ -16,7 +17,7 @@ use crate::receiver::ALL_GROUPS;
 /// Numbers of elements of the arrays, in their order.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-struct Header {
+struct ExtrasHeader {
     /// Light groups of every leaf, and then of the environment as a light; none if all lights are in all groups.
     groups: u32,
     /// Distant lights that can send something, neighbors in direction next to each other.
@@ -31,8 +32,8 @@ struct Header {
     motion: u32,
 }
 
-/// Words of a [`Header`].
-const HEADER: usize = size_of::<Header>() / size_of::<u32>();
+/// Words of an [`ExtrasHeader`].
+const HEADER: usize = size_of::<ExtrasHeader>() / size_of::<u32>();
 /// Words of a distant light.
 const DISTANT: usize = size_of::<DistantRecord>() / size_of::<u32>();
 /// Words of a group of distant lights.
@@ -53,7 +54,7 @@ pub(super) fn pack(
     if groups.is_empty() && distants.is_empty() && profile_starts.is_empty() && motion.is_empty() {
         return Vec::new();
     }
-    let header = Header {
+    let header = ExtrasHeader {
         groups: groups.len() as u32,
         distants: distants.len() as u32,
         distant_groups: distant_groups.len() as u32,
@@ -81,7 +82,7 @@ pub(super) fn replace_motion(extras: &mut Vec<u32>, motion: &[u32]) {
     }
     let header = Extras(extras).header();
     extras.truncate(extras.len() - (header.motion as usize).min(extras.len()));
-    let header = Header { motion: motion.len() as u32, ..header };
+    let header = ExtrasHeader { motion: motion.len() as u32, ..header };
     if let Some(place) = extras.get_mut(..HEADER) {
         place.copy_from_slice(bytemuck::cast_slice(core::slice::from_ref(&header)));
     }
@@ -115,8 +116,10 @@ impl<'a> Extras<'a> {
     }
 
     #[inline]
-    fn header(self) -> Header {
-        self.0.get(..HEADER).map_or_else(Header::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
+    fn header(self) -> ExtrasHeader {
+        self.0
+            .get(..HEADER)
+            .map_or_else(ExtrasHeader::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
     }
 
     /// Returns so many words of an array, after so many of the arrays before. Words that are not there, which
@@ -146,20 +149,20 @@ impl<'a> Extras<'a> {
 
     /// Returns the distant lights.
     pub(crate) fn distants(self) -> &'a [DistantRecord] {
-        let Header { groups, distants, .. } = self.header();
+        let ExtrasHeader { groups, distants, .. } = self.header();
         bytemuck::cast_slice(self.words(groups as usize, distants as usize * DISTANT))
     }
 
     /// Returns the groups of distant lights.
     pub(crate) fn distant_groups(self) -> &'a [DistantGroup] {
-        let Header { groups, distants, distant_groups, .. } = self.header();
+        let ExtrasHeader { groups, distants, distant_groups, .. } = self.header();
         let before = groups as usize + distants as usize * DISTANT;
         bytemuck::cast_slice(self.words(before, distant_groups as usize * DISTANT_GROUP))
     }
 
     /// Returns the profiles.
     pub(super) fn profiles(self) -> Profiles<'a> {
-        let Header { groups, distants, distant_groups, profile_starts, profile_values, .. } = self.header();
+        let ExtrasHeader { groups, distants, distant_groups, profile_starts, profile_values, .. } = self.header();
         let [starts, values] = [profile_starts, profile_values].map(|count| count as usize);
         let before = groups as usize + distants as usize * DISTANT + distant_groups as usize * DISTANT_GROUP;
         let values = bytemuck::cast_slice(self.words(before + starts, values));
@@ -179,7 +182,7 @@ impl<'a> Extras<'a> {
         if self.is_empty() {
             return Ok(());
         }
-        let Header { groups, distants, distant_groups, profile_starts, profile_values, motion } = self.header();
+        let ExtrasHeader { groups, distants, distant_groups, profile_starts, profile_values, motion } = self.header();
         let counts = [
             (groups, 1),
             (distants, DISTANT),
@@ -202,7 +205,7 @@ impl<'a> Extras<'a> {
 }
 
 /// Returns the header and the arrays, with room for a header where there was none.
-fn header_mut(extras: &mut Vec<u32>) -> &mut Header {
+fn header_mut(extras: &mut Vec<u32>) -> &mut ExtrasHeader {
     if extras.is_empty() {
         extras.resize(HEADER, 0);
     }

@@ -61,16 +61,16 @@ pub(crate) struct FewTriangles<'a> {
 }
 
 /// What the pass finds out, by lanes: one for each triangle.
-struct Faces<const N: usize> {
+struct Faces<const LANES: usize> {
     /// Weights of the corners, relative to each other.
-    corners: [[f64; N]; 3],
+    corners: [[f64; LANES]; 3],
     /// Normals of the front times twice the area, by coordinate.
-    normals: [[f64; N]; 3],
-    radiances: [f64; N],
+    normals: [[f64; LANES]; 3],
+    radiances: [f64; LANES],
     /// Radiance times twice the area times the distance from the plane.
-    strengths: [f64; N],
+    strengths: [f64; LANES],
     /// Sum of the weights of all points. Zero where nothing arrives.
-    weights: [f64; N],
+    weights: [f64; LANES],
 }
 
 impl<'a> FewTriangles<'a> {
@@ -116,14 +116,14 @@ impl<'a> FewTriangles<'a> {
 
     /// Weighs all triangles; `None` where the tree has to be asked.
     #[inline(always)]
-    fn weigh<const N: usize>(&self) -> Option<Faces<N>> {
+    fn weigh<const LANES: usize>(&self) -> Option<Faces<LANES>> {
         let records = self.lights.records;
         let first = records.first()?;
-        let [mut ax, mut ay, mut az] = [[0.0_f32; N]; 3];
-        let [mut bx, mut by, mut bz] = [[0.0_f32; N]; 3];
-        let [mut cx, mut cy, mut cz] = [[0.0_f32; N]; 3];
-        let (mut weights_of_records, mut flags) = ([0.0_f32; N], [0_u32; N]);
-        for i in 0..N {
+        let [mut ax, mut ay, mut az] = [[0.0_f32; LANES]; 3];
+        let [mut bx, mut by, mut bz] = [[0.0_f32; LANES]; 3];
+        let [mut cx, mut cy, mut cz] = [[0.0_f32; LANES]; 3];
+        let (mut weights_of_records, mut flags) = ([0.0_f32; LANES], [0_u32; LANES]);
+        for i in 0..LANES {
             // Lanes beyond the last triangle repeat the first one, with no radiance.
             let (record, share) = records.get(i).map_or((first, 0.0), |record| (record, 1.0));
             let [a, b, c] = &record.vertices;
@@ -134,11 +134,11 @@ impl<'a> FewTriangles<'a> {
             self.scale(&mut weights_of_records);
         }
         let (origin, normal) = (self.x.position.as_dvec3(), self.x.receiver.normal().as_dvec3());
-        let [mut w0, mut w1, mut w2] = [[0.0; N]; 3];
-        let [mut nx, mut ny, mut nz] = [[0.0; N]; 3];
-        let [mut radiances, mut strengths, mut weights] = [[0.0; N]; 3];
-        let mut doubts = [0_u64; N];
-        for i in 0..N {
+        let [mut w0, mut w1, mut w2] = [[0.0; LANES]; 3];
+        let [mut nx, mut ny, mut nz] = [[0.0; LANES]; 3];
+        let [mut radiances, mut strengths, mut weights] = [[0.0; LANES]; 3];
+        let mut doubts = [0_u64; LANES];
+        for i in 0..LANES {
             let a = DVec3::new(ax[i].into(), ay[i].into(), az[i].into());
             let b = DVec3::new(bx[i].into(), by[i].into(), bz[i].into());
             let c = DVec3::new(cx[i].into(), cy[i].into(), cz[i].into());
@@ -164,7 +164,7 @@ impl<'a> FewTriangles<'a> {
             (nx[i], ny[i], nz[i]) = (front.x, front.y, front.z);
             (radiances[i], strengths[i]) = (radiance, strength);
         }
-        if doubts != [0; N] && !self.are_dark(&doubts) {
+        if doubts != [0; LANES] && !self.are_dark(&doubts) {
             return None;
         }
         Some(Faces { corners: [w0, w1, w2], normals: [nx, ny, nz], radiances, strengths, weights })
@@ -187,19 +187,19 @@ impl<'a> FewTriangles<'a> {
 }
 
 /// Draws a point.
-struct SampleFew<'f, const N: usize> {
+struct SampleFew<'f, const LANES: usize> {
     few: &'f FewTriangles<'f>,
     u: [f32; 3],
 }
 
-impl<const N: usize> Kernel for SampleFew<'_, N> {
+impl<const LANES: usize> Kernel for SampleFew<'_, LANES> {
     type Output = Option<Option<LightSample>>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
         let Self { few, u: [choice, u, v] } = self;
-        let faces: Faces<N> = few.weigh()?;
-        let mut ends = [0.0; N];
+        let faces: Faces<LANES> = few.weigh()?;
+        let mut ends = [0.0; LANES];
         let mut total = 0.0;
         for (end, weight) in ends.iter_mut().zip(&faces.weights) {
             total += weight;
@@ -219,7 +219,7 @@ impl<const N: usize> Kernel for SampleFew<'_, N> {
             lane += usize::from(is_past);
             start = if is_past { end } else { start };
         }
-        let lane = lane % N;
+        let lane = lane % LANES;
         let (face, record) = (faces.face(lane), few.lights.records.get(lane)?);
         // Numbers outside of the unit interval, and NaN, end at the rim.
         let point = Lattice::inside(square_to_triangle([u.into(), v.into()]));
@@ -252,24 +252,24 @@ impl<const N: usize> Kernel for SampleFew<'_, N> {
 }
 
 /// Finds the density of a point.
-struct DensityOfFew<'f, const N: usize> {
+struct DensityOfFew<'f, const LANES: usize> {
     few: &'f FewTriangles<'f>,
     leaf: u32,
     point: Lattice,
 }
 
-impl<const N: usize> Kernel for DensityOfFew<'_, N> {
+impl<const LANES: usize> Kernel for DensityOfFew<'_, LANES> {
     type Output = Option<[f64; 2]>;
 
     #[inline(always)]
     fn run(self) -> Self::Output {
         let Self { few, leaf, point } = self;
-        let faces: Faces<N> = few.weigh()?;
+        let faces: Faces<LANES> = few.weigh()?;
         let mut total = 0.0;
         for weight in faces.weights {
             total += weight;
         }
-        let lane = leaf as usize % N;
+        let lane = leaf as usize % LANES;
         if !(faces.weights[lane] > 0.0 && total < f64::INFINITY) {
             return Some([0.0; 2]);
         }
@@ -293,7 +293,7 @@ struct Face {
     strength: f64,
 }
 
-impl<const N: usize> Faces<N> {
+impl<const LANES: usize> Faces<LANES> {
     #[inline(always)]
     fn face(&self, lane: usize) -> Face {
         let [x, y, z] = &self.normals;

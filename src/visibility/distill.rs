@@ -56,20 +56,20 @@ const PRIOR_MASS: f32 = 32.0;
 const LEAST_MASS: f32 = 2e-4;
 
 /// A lane: its node's key, and its number.
-type Slot = u64;
+type LaneKey = u64;
 
-fn slot(key: u32, lane: u32) -> Slot {
+fn slot(key: u32, lane: u32) -> LaneKey {
     u64::from(key) << 4 | u64::from(lane)
 }
 
-fn key_of(slot: Slot) -> u32 {
+fn key_of(slot: LaneKey) -> u32 {
     (slot >> 4) as u32
 }
 
 /// What was counted of a lane, in units of one report.
 #[derive(Clone, Copy, Debug)]
 struct Count {
-    slot: Slot,
+    slot: LaneKey,
     squares: f32,
     asked: f32,
     seen: f32,
@@ -91,7 +91,7 @@ struct Beliefs {
 /// What is believed of a lane.
 #[derive(Clone, Copy, Debug)]
 struct Belief {
-    slot: Slot,
+    slot: LaneKey,
     /// How often it is asked about, relative to all that is.
     mass: f32,
     /// Share of what is sent that gets through.
@@ -101,7 +101,7 @@ struct Belief {
 }
 
 impl Beliefs {
-    fn get(&self, slot: Slot) -> Option<&Belief> {
+    fn get(&self, slot: LaneKey) -> Option<&Belief> {
         let at = self.slots.binary_search_by_key(&slot, |belief| belief.slot).ok()?;
         Some(&self.slots[at])
     }
@@ -113,7 +113,7 @@ impl Beliefs {
 }
 
 /// An entry that may be kept.
-struct Entry {
+struct FactorEntry {
     region: u32,
     key: u32,
     factors: Factors,
@@ -144,7 +144,7 @@ struct Distiller<'a> {
 
 impl Distiller<'_> {
     /// Makes the entries of all regions below a node of the tree over regions.
-    fn descend(&self, node: usize, prior: Option<&Beliefs>, entries: &mut Vec<Entry>) {
+    fn descend(&self, node: usize, prior: Option<&Beliefs>, entries: &mut Vec<FactorEntry>) {
         let mut records = Vec::new();
         self.gather(node, &mut records);
         if records.is_empty() {
@@ -222,7 +222,7 @@ impl Distiller<'_> {
     }
 
     /// Lane that leads to a node.
-    fn parent(&self, key: u32) -> Option<Slot> {
+    fn parent(&self, key: u32) -> Option<LaneKey> {
         if key & SKY != 0 {
             return (key > SKY).then(|| slot(SKY, 0));
         }
@@ -297,7 +297,7 @@ impl Distiller<'_> {
     }
 
     /// Makes the entries of a region.
-    fn add_entries(&self, region: u32, counts: &[Count], beliefs: &Beliefs, entries: &mut Vec<Entry>) {
+    fn add_entries(&self, region: u32, counts: &[Count], beliefs: &Beliefs, entries: &mut Vec<FactorEntry>) {
         let all = self.asked(counts);
         let first = entries.len();
         for of_node in beliefs.nodes() {
@@ -313,7 +313,7 @@ impl Distiller<'_> {
             }
             // The first entry says how much arrives at all.
             let gain = if parent.is_none() { f32::MAX } else { gain };
-            entries.push(Entry { region, key, factors, gain });
+            entries.push(FactorEntry { region, key, factors, gain });
         }
         // An entry is kept where one below it is.
         for i in (first..entries.len()).rev() {
@@ -337,7 +337,7 @@ impl Distiller<'_> {
     }
 
     /// Makes the table of the entries that gain most.
-    fn freeze(&self, mut entries: Vec<Entry>, max_bytes: usize) -> Visibility {
+    fn freeze(&self, mut entries: Vec<FactorEntry>, max_bytes: usize) -> Visibility {
         let limit = max_bytes / (size_of::<u32>() + size_of::<Factors>());
         if entries.len() > limit {
             entries.sort_by(|a, b| b.gain.total_cmp(&a.gain).then((a.region, a.key).cmp(&(b.region, b.key))));

@@ -30,13 +30,13 @@ pub(crate) fn orientation(receiver: &Receiver) -> usize {
 
 /// Where the reports of a region are.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Extent {
+pub(crate) struct RegionExtent {
     pub(crate) count: u64,
     pub(crate) low: Vec3,
     pub(crate) high: Vec3,
 }
 
-impl Extent {
+impl RegionExtent {
     pub(crate) const EMPTY: Self = Self { count: 0, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
     /// Adds a position.
@@ -67,9 +67,9 @@ pub(crate) struct RegionBuilder {
     /// Node of each region.
     leaves: Vec<u32>,
     /// Where the reports of each region are, since it was divided.
-    pub(crate) extents: Vec<Extent>,
+    pub(crate) extents: Vec<RegionExtent>,
     /// Where all reports of an orientation are.
-    around: [Extent; ORIENTATIONS],
+    around: [RegionExtent; ORIENTATIONS],
 }
 
 impl RegionBuilder {
@@ -79,14 +79,14 @@ impl RegionBuilder {
         Self {
             nodes: (0..count).map(|first| RegionNode { kind: REGION, plane: 0.0, first }).collect(),
             leaves: (0..count).collect(),
-            extents: vec![Extent::EMPTY; ORIENTATIONS],
-            around: [Extent::EMPTY; ORIENTATIONS],
+            extents: vec![RegionExtent::EMPTY; ORIENTATIONS],
+            around: [RegionExtent::EMPTY; ORIENTATIONS],
         }
     }
 
     /// Returns the same regions as if nothing had been reported.
     pub(crate) fn without_reports(mut self) -> Self {
-        self.extents.fill(Extent::EMPTY);
+        self.extents.fill(RegionExtent::EMPTY);
         self
     }
 
@@ -101,7 +101,7 @@ impl RegionBuilder {
     }
 
     /// Adds where the reports of all regions have been.
-    pub(crate) fn add(&mut self, extents: &[Extent]) {
+    pub(crate) fn add(&mut self, extents: &[RegionExtent]) {
         self.extents.iter_mut().zip(extents).for_each(|(extent, other)| extent.merge(other));
     }
 
@@ -134,8 +134,8 @@ impl RegionBuilder {
         }
         self.leaves[region as usize] = first;
         self.leaves.push(first + 1);
-        self.extents[region as usize] = Extent::EMPTY;
-        self.extents.push(Extent::EMPTY);
+        self.extents[region as usize] = RegionExtent::EMPTY;
+        self.extents.push(RegionExtent::EMPTY);
         Some(new)
     }
 
@@ -154,7 +154,7 @@ impl RegionBuilder {
         while let Some(&(region, start, end)) = waiting.get(next) {
             next += 1;
             let points = &mut points[start..end];
-            let mut extent = Extent::EMPTY;
+            let mut extent = RegionExtent::EMPTY;
             points.iter().for_each(|(_, position)| extent.add(*position));
             if points.len() <= most || self.len() >= limit {
                 continue;
@@ -167,7 +167,7 @@ impl RegionBuilder {
             waiting.push((region, start, start + below));
             waiting.push((new, start + below, end));
         }
-        self.extents.fill(Extent::EMPTY);
+        self.extents.fill(RegionExtent::EMPTY);
     }
 
     /// Returns the nodes as a table holds them, with regions numbered anew: `number` returns the new number, or `None`

@@ -119,14 +119,16 @@ impl InstanceRecord {
         let columns = instance.transform.to_cols_array_2d();
         let record = Self { columns, object, scale: instance.scale, leaf: super::NO_LEAF, number: instance.object.0 };
         let moves = || instance.end_columns().map_or(Ok(()), |end| record.check_motion(&end, [low, high]));
-        record.check([low, high]).and_then(|()| moves()).map(|()| record).map_err(|Fault { what, value, expected }| {
-            Error(ErrorKind::Instance { instance: number, what, value, expected })
-        })
+        record.check([low, high]).and_then(|()| moves()).map(|()| record).map_err(
+            |InstanceFault { what, value, expected }| {
+                Error(ErrorKind::Instance { instance: number, what, value, expected })
+            },
+        )
     }
 
     /// Checks the numbers, which may come from outside.
-    pub(super) fn check(&self, [low, high]: [Vec3; 2]) -> Result<(), Fault> {
-        let fault = |what, value: f64, expected| Err(Fault { what, value: value as f32, expected });
+    pub(super) fn check(&self, [low, high]: [Vec3; 2]) -> Result<(), InstanceFault> {
+        let fault = |what, value: f64, expected| Err(InstanceFault { what, value: value as f32, expected });
         if let Some(&value) = self.columns.as_flattened().iter().find(|value| !value.is_finite()) {
             return fault("an element of the transform", f64::from(value), "finite");
         }
@@ -162,7 +164,7 @@ impl InstanceRecord {
 
 /// A number that an instance must not have.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Fault {
+pub(super) struct InstanceFault {
     what: &'static str,
     value: f32,
     expected: &'static str,

@@ -7,7 +7,7 @@
 use glam::{Affine3A, DMat3, DVec3, Vec3};
 
 use super::bounds::mapped_cone_of;
-use super::{Fault, Instance, InstanceRecord, LARGEST_CONDITION, LARGEST_SCALE, PlacedObject};
+use super::{Instance, InstanceFault, InstanceRecord, LARGEST_CONDITION, LARGEST_SCALE, PlacedObject};
 use crate::geometry::{Cone, Placement, cofactors, determinants, norm};
 use crate::light::Extras;
 use crate::light::motion::{EndColumns, PARTS, convex_cone, simpson, widened};
@@ -42,11 +42,11 @@ impl Instance {
 
 impl InstanceRecord {
     /// Checks the transform at the end of the interval, and that it can be inverted at all times.
-    pub(super) fn check_motion(&self, end: &EndColumns, corners: [Vec3; 2]) -> Result<(), Fault> {
+    pub(super) fn check_motion(&self, end: &EndColumns, corners: [Vec3; 2]) -> Result<(), InstanceFault> {
         Self { columns: *end, ..*self }.check(corners)?;
         let [start, end] = [&self.columns, end].map(|columns| Placement::new(columns).linear);
         let at = |time: f64| start + (end - start) * time;
-        check_between(&at, [0.0, 1.0], MOST_HALVINGS).map_err(|time| Fault {
+        check_between(&at, [0.0, 1.0], MOST_HALVINGS).map_err(|time| InstanceFault {
             what: "time at which the transform cannot be inverted",
             value: time as f32,
             expected: "none from 0 to 1",

@@ -31,7 +31,7 @@ pub(super) type EndColumns = [[f32; 3]; 4];
 /// Numbers of elements of the arrays, in their order.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-struct Header {
+struct MotionHeader {
     /// Meshes that move.
     meshes: u32,
     /// Triangles of all of them.
@@ -40,8 +40,8 @@ struct Header {
     instances: u32,
 }
 
-/// Words of a [`Header`]. *Format.*
-const HEADER: usize = size_of::<Header>() / size_of::<u32>();
+/// Words of a [`MotionHeader`]. *Format.*
+const HEADER: usize = size_of::<MotionHeader>() / size_of::<u32>();
 /// Words of a [`MovingMesh`]. *Format.*
 const MESH: usize = size_of::<MovingMesh>() / size_of::<u32>();
 /// Words of the vertices of a triangle. *Format.*
@@ -59,7 +59,7 @@ pub(super) struct MovingMesh {
     start: u32,
 }
 
-/// The ends of all that moves, in borrowed memory: a [`Header`], and then the arrays that it counts. Empty if nothing
+/// The ends of all that moves, in borrowed memory: a [`MotionHeader`], and the arrays that it counts. Empty if nothing
 /// moves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion<'a>(pub(super) &'a [u32]);
@@ -72,8 +72,10 @@ impl<'a> Motion<'a> {
     }
 
     #[inline]
-    fn header(self) -> Header {
-        self.0.get(..HEADER).map_or_else(Header::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
+    fn header(self) -> MotionHeader {
+        self.0
+            .get(..HEADER)
+            .map_or_else(MotionHeader::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
     }
 
     /// Returns so many words after so many of the arrays before. Words that are not there, which validation refuses,
@@ -88,12 +90,12 @@ impl<'a> Motion<'a> {
     }
 
     fn triangles(self) -> &'a [EndVertices] {
-        let Header { meshes, triangles, .. } = self.header();
+        let MotionHeader { meshes, triangles, .. } = self.header();
         bytemuck::cast_slice(self.words(meshes as usize * MESH, triangles as usize * VERTICES))
     }
 
     fn words_before_instances(self) -> usize {
-        let Header { meshes, triangles, .. } = self.header();
+        let MotionHeader { meshes, triangles, .. } = self.header();
         meshes as usize * MESH + triangles as usize * VERTICES
     }
 
@@ -133,7 +135,7 @@ impl<'a> Motion<'a> {
         if self.is_empty() {
             return Ok(());
         }
-        let Header { meshes, triangles, instances } = self.header();
+        let MotionHeader { meshes, triangles, instances } = self.header();
         let sizes = [(meshes, MESH), (triangles, VERTICES), (instances, 1 + COLUMNS)];
         let words = sizes.iter().fold(HEADER as u64, |sum, (count, size)| sum + u64::from(*count) * *size as u64);
         if words != self.0.len() as u64 || words == HEADER as u64 {
@@ -209,7 +211,7 @@ impl MotionCollection {
         let triangles: Vec<EndVertices> = self.meshes.values().flatten().copied().collect();
         let instances: Vec<u32> = self.instances.keys().copied().collect();
         let columns: Vec<EndColumns> = self.instances.values().copied().collect();
-        let header = Header {
+        let header = MotionHeader {
             meshes: meshes.len() as u32,
             triangles: triangles.len() as u32,
             instances: instances.len() as u32,

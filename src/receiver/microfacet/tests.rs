@@ -8,14 +8,14 @@ use crate::testing::Pcg32;
 
 /// A surface and the numbers that it was made of, with the normal z and the tangent x.
 #[derive(Clone, Copy, Debug)]
-struct Parameters {
+struct MicrofacetParameters {
     outgoing: [f64; 3],
     alphas: [f64; 2],
     weights: [f64; 3],
     ior: f64,
 }
 
-impl Parameters {
+impl MicrofacetParameters {
     fn surface(&self) -> Microfacet {
         let [diffuse, reflected, transmitted] = self.weights.map(|weight| weight as f32);
         Microfacet::new(Vec3::Z, DVec3::from_array(self.outgoing).as_vec3(), 0.5)
@@ -58,8 +58,8 @@ impl Parameters {
     }
 }
 
-fn lobes() -> [Parameters; 8] {
-    let of = |outgoing, alphas, weights, ior| Parameters { outgoing, alphas, weights, ior };
+fn lobes() -> [MicrofacetParameters; 8] {
+    let of = |outgoing, alphas, weights, ior| MicrofacetParameters { outgoing, alphas, weights, ior };
     [
         of([0.6, 0.0, 0.8], [0.1, 0.5], [0.0, 1.0, 0.0], 1.0),
         of([0.48, 0.6, 0.64], [0.3, 0.05], [0.5, 0.5, 0.0], 1.0),
@@ -73,7 +73,7 @@ fn lobes() -> [Parameters; 8] {
 }
 
 /// A direction, often near what is scattered most.
-fn direction(parameters: &Parameters, pcg: &mut Pcg32, i: usize) -> Vec3 {
+fn direction(parameters: &MicrofacetParameters, pcg: &mut Pcg32, i: usize) -> Vec3 {
     let [x, y, z] = parameters.outgoing.map(|v| v as f32);
     let across = Vec3::new(-x, -y, 0.0) / parameters.ior as f32;
     let straight = across - (1.0 - across.length_squared()).max(0.0).sqrt() * Vec3::Z;
@@ -124,7 +124,7 @@ fn isotropic_reflections_are_those_of_glossy_surfaces() {
 #[test]
 fn transmitted_light_adds_up() {
     for parameters in lobes().into_iter().filter(|parameters| parameters.weights[2] > 0.0 && parameters.ior >= 1.0) {
-        let only = Parameters { weights: [0.0, 0.0, 1.0], ..parameters };
+        let only = MicrofacetParameters { weights: [0.0, 0.0, 1.0], ..parameters };
         let x = ShadingPoint::microfacet(Vec3::ZERO, only.surface());
         let n = 1200;
         let mut sum = 0.0;

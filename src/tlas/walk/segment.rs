@@ -74,7 +74,7 @@ pub(crate) struct ClusterMoments {
 
 /// A cluster that may be opened.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct OpenCluster {
     cluster: ClusterAlong,
     /// The node below, and how much there is to gain by opening it; nothing for a leaf.
     below: Option<(u32, f32)>,
@@ -104,12 +104,12 @@ impl ClusterAlong {
 impl<const N: usize> WideTree<'_, N> {
     /// Finds clusters of lights in any of these light groups.
     pub(super) fn clusters_along(&self, stretch: &Stretch, groups: u32) -> Clusters {
-        let mut entries = SmallVec::<[Entry; MOST_CLUSTERS]>::new();
+        let mut entries = SmallVec::<[OpenCluster; MOST_CLUSTERS]>::new();
         if !self.nodes.is_empty() {
             self.add_lanes(0, stretch, groups, &mut entries);
         }
         while entries.len() + N <= MOST_CLUSTERS + 1 {
-            let gain = |entry: &Entry| entry.below.map_or(0.0, |(_, gain)| gain);
+            let gain = |entry: &OpenCluster| entry.below.map_or(0.0, |(_, gain)| gain);
             let best = (0..entries.len()).max_by(|&a, &b| gain(&entries[a]).total_cmp(&gain(&entries[b])));
             let Some((at, (node, gain))) = best.and_then(|at| Some((at, entries[at].below?))) else { break };
             if gain == 0.0 {
@@ -121,7 +121,13 @@ impl<const N: usize> WideTree<'_, N> {
         entries.iter().map(|entry| entry.cluster).collect()
     }
 
-    fn add_lanes(&self, index: usize, stretch: &Stretch, groups: u32, entries: &mut SmallVec<[Entry; MOST_CLUSTERS]>) {
+    fn add_lanes(
+        &self,
+        index: usize,
+        stretch: &Stretch,
+        groups: u32,
+        entries: &mut SmallVec<[OpenCluster; MOST_CLUSTERS]>,
+    ) {
         let node = &self.nodes[index];
         for lane in 0..usize::from(node.width).min(N) {
             if !self.groups.is_empty() && self.groups[index * N + lane] & groups == 0 {
@@ -136,7 +142,7 @@ impl<const N: usize> WideTree<'_, N> {
                 Child::Leaf(_) | Child::Empty => None,
             };
             if entries.len() < MOST_CLUSTERS {
-                entries.push(Entry { cluster, below });
+                entries.push(OpenCluster { cluster, below });
             }
         }
     }

@@ -66,7 +66,7 @@ fn transforms_that_cannot_be_inverted_are_found() {
         |linear| InstanceRecord { columns: columns(linear, Vec3::ZERO), object: 0, scale: 1.0, leaf: 0, number: 0 };
     let check = |start: Mat3, end: Mat3| {
         let fault = record(start).check_motion(&columns(end, Vec3::ZERO), [Vec3::ZERO, Vec3::ONE]);
-        fault.map_err(|Fault { value, .. }| value)
+        fault.map_err(|InstanceFault { value, .. }| value)
     };
     let scale = |x: f32, y: f32, z: f32| Mat3::from_diagonal(Vec3::new(x, y, z));
     assert_eq!(check(Mat3::IDENTITY, scale(1.0, -3.0, 1.0)), Err(0.25));
