@@ -149,18 +149,47 @@ impl<const N: usize> WideTree<'_, N> {
     /// children's weights is its weight. That is one level, and depends on the shading point alone.
     #[inline(always)]
     pub(super) fn weights(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> [f32; N] {
-        let node = &self.nodes[index];
-        let mut estimates = node.asked(index, x, oracle);
-        if !self.groups.is_empty() {
-            estimates = self.within_groups(index, oracle.shading_point().groups, estimates);
+        self.weights_by(index, self.own_estimates(index, x, oracle), x, oracle, |_, _| ())
+    }
+
+    /// Returns the estimates of a node's children, of which none is opened yet.
+    #[inline(always)]
+    pub(super) fn own_estimates(
+        &self,
+        index: usize,
+        x: &ReceiverLanes<impl Lobe>,
+        oracle: &impl LeafOracle,
+    ) -> Estimates<N> {
+        let estimates = self.nodes[index].asked(index, x, oracle);
+        if self.groups.is_empty() {
+            estimates
+        } else {
+            self.within_groups(index, oracle.shading_point().groups, estimates)
         }
+    }
+
+    /// Returns [`weights`](Self::weights) by the estimates of a node's children. Each child that is opened is passed on
+    /// with the estimates of its own children.
+    #[inline(always)]
+    pub(super) fn weights_by(
+        &self,
+        index: usize,
+        estimates: Estimates<N>,
+        x: &ReceiverLanes<impl Lobe>,
+        oracle: &impl LeafOracle,
+        mut pass_on: impl FnMut(u32, Estimates<N>),
+    ) -> [f32; N] {
+        let first_node = self.nodes[index].first_node;
         let Estimates { mut weights, mut largest, mut opened, .. } = estimates;
         if opened != 0 {
             while opened != 0 {
                 let lane = opened.trailing_zeros();
                 opened &= opened - 1;
-                let child = node.first_node.wrapping_add(lane);
-                let sum = self.opened(child as usize, x, oracle);
+                let child = first_node.wrapping_add(lane);
+                let below = self.own_estimates(child as usize, x, oracle);
+                pass_on(child, below);
+                let sum: f32 = below.weights.iter().sum();
+                let sum = only_if(sum > 0.0, within_range(sum));
                 let is_known = oracle.has_factors();
                 weights[lane as usize] =
                     if is_known { self.inherited(index, lane, child as usize, oracle, sum) } else { sum };
@@ -169,17 +198,6 @@ impl<const N: usize> WideTree<'_, N> {
         }
         keep_least(&mut weights, largest);
         weights
-    }
-
-    /// Returns the sum of the weights of a node's children.
-    #[inline(always)]
-    fn opened(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> f32 {
-        let mut estimates = self.nodes[index].asked(index, x, oracle);
-        if !self.groups.is_empty() {
-            estimates = self.within_groups(index, oracle.shading_point().groups, estimates);
-        }
-        let sum: f32 = estimates.weights.iter().sum();
-        only_if(sum > 0.0, within_range(sum))
     }
 }
 

@@ -6,12 +6,11 @@
 
 use super::FirstWeights;
 use super::importance::{Estimates, LeafOracle};
-use crate::math::only_if;
-use crate::receiver::{Lobe, ReceiverLanes};
+use crate::receiver::Lobe;
 use crate::simd::Kernel;
 use crate::tlas::node::Child;
 use crate::tlas::tree::WideTree;
-use crate::warp::{Variate, keep_least, pick_wide, within_range};
+use crate::warp::{Variate, pick_wide};
 
 /// Most children of a node whose estimates are kept. Affects time alone. *Chosen*: near a plane of lights about three
 /// children of a node are near.
@@ -36,10 +35,10 @@ impl<const N: usize> Kept<N> {
     }
 
     #[inline(always)]
-    fn keep(&mut self, node: u32, estimates: &Estimates<N>) {
+    fn keep(&mut self, node: u32, estimates: Estimates<N>) {
         if self.len < MOST_KEPT {
             self.nodes[self.len] = node;
-            self.estimates[self.len] = *estimates;
+            self.estimates[self.len] = estimates;
             self.len += 1;
         }
     }
@@ -80,7 +79,7 @@ impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for KeepingWalk<'_, N, S, L>
                         Some(estimates) => estimates,
                         None => tlas.own_estimates(node as usize, &receiver, oracle),
                     };
-                    tlas.opened_weights(node as usize, own, &receiver, oracle, &mut kept)
+                    tlas.weights_by(node as usize, own, &receiver, oracle, |child, below| kept.keep(child, below))
                 }
             };
             let (lane, share) = pick_wide(&weights, u)?;
@@ -91,50 +90,5 @@ impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for KeepingWalk<'_, N, S, L>
                 Child::Empty => return None,
             }
         }
-    }
-}
-
-impl<const N: usize> WideTree<'_, N> {
-    /// Returns the estimates of a node's children, of which none is opened yet.
-    #[inline(always)]
-    fn own_estimates(&self, index: usize, x: &ReceiverLanes<impl Lobe>, oracle: &impl LeafOracle) -> Estimates<N> {
-        let estimates = self.nodes[index].asked(index, x, oracle);
-        if self.groups.is_empty() {
-            estimates
-        } else {
-            self.within_groups(index, oracle.shading_point().groups, estimates)
-        }
-    }
-
-    /// Returns [`weights`](Self::weights) by the estimates of a node's children, and keeps those of the children that
-    /// are opened.
-    #[inline(always)]
-    fn opened_weights(
-        &self,
-        index: usize,
-        estimates: Estimates<N>,
-        x: &ReceiverLanes<impl Lobe>,
-        oracle: &impl LeafOracle,
-        kept: &mut Kept<N>,
-    ) -> [f32; N] {
-        let first_node = self.nodes[index].first_node;
-        let Estimates { mut weights, mut largest, mut opened, .. } = estimates;
-        if opened != 0 {
-            while opened != 0 {
-                let lane = opened.trailing_zeros();
-                opened &= opened - 1;
-                let child = first_node.wrapping_add(lane);
-                let below = self.own_estimates(child as usize, x, oracle);
-                kept.keep(child, &below);
-                let sum: f32 = below.weights.iter().sum();
-                let sum = only_if(sum > 0.0, within_range(sum));
-                let is_known = oracle.has_factors();
-                weights[lane as usize] =
-                    if is_known { self.inherited(index, lane, child as usize, oracle, sum) } else { sum };
-            }
-            largest = weights.iter().fold(0, |largest, weight| largest.max(weight.to_bits()));
-        }
-        keep_least(&mut weights, largest);
-        weights
     }
 }

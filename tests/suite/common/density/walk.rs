@@ -23,6 +23,12 @@ impl Cell {
         0.25f64.powi(self.depth as i32)
     }
 
+    /// From barycentrics of the cell to those of the triangle.
+    fn place(&self, b: [f64; 2]) -> [f64; 2] {
+        let [p, q, r] = self.corners;
+        core::array::from_fn(|i| p[i] + (q[i] - p[i]) * b[0] + (r[i] - p[i]) * b[1])
+    }
+
     fn quarters(&self) -> [[[f64; 2]; 3]; 4] {
         core::array::from_fn(|i| quarter(self.corners, i))
     }
@@ -40,6 +46,19 @@ pub(super) struct Open {
 
 /// Ratio of the largest to the least scale in a cell up to which its solid angle helps.
 const MOST_SCALES: f64 = 2.0;
+
+/// Whether all of these values lie on the linear function of the barycentrics that the first three of them give, up to
+/// rounding.
+fn is_linear(values: &[([f64; 2], f64)]) -> bool {
+    let [(p, f), (q, g), (r, h)] = [values[0], values[1], values[2]];
+    let (e, d) = ([q[0] - p[0], q[1] - p[1]], [r[0] - p[0], r[1] - p[1]]);
+    let determinant = e[0] * d[1] - e[1] * d[0];
+    let [u, v] = [((g - f) * d[1] - (h - f) * e[1]) / determinant, ((h - f) * e[0] - (g - f) * d[0]) / determinant];
+    values.iter().all(|(b, value)| {
+        let linear = f + u * (b[0] - p[0]) + v * (b[1] - p[1]);
+        *value > 0.0 && (linear - value).abs() <= 1e-4 * value
+    })
+}
 
 /// Differences of the largest and the least density that were seen in a cell.
 #[derive(Clone, Copy, Debug)]
@@ -138,6 +157,9 @@ impl<'a, 'b> Walk<'a, 'b> {
             return self.divide(cell);
         }
         let are_equal = range(values.iter().map(|v| v.pdf)) == 0.0 || range(values.iter().map(|v| v.level())) == 0.0;
+        if !are_equal && self.settle_smooth(&cell, &quarters, &values) {
+            return;
+        }
         // Averages are rounded, so that four can be the same by chance: then their quarters must be, too.
         let mut parts = Vec::new();
         if cell.depth < DEEPEST_DOUBT && are_equal {
@@ -164,6 +186,32 @@ impl<'a, 'b> Walk<'a, 'b> {
             self.doubt += key;
             self.open.push(Open { key, cell, range, values });
         }
+    }
+
+    /// Adds a cell in which the density per area is linear, up to rounding. Returns whether it is.
+    fn settle_smooth(&mut self, cell: &Cell, quarters: &[[[f64; 2]; 3]; 4], values: &[Density; 4]) -> bool {
+        let mut seen: Vec<_> = quarters.iter().zip(values).map(|(q, v)| (middle(*q), v.by_area())).collect();
+        if !is_linear(&seen) {
+            return false;
+        }
+        let coarse: f64 = seen.iter().map(|v| v.1).sum::<f64>() / 4.0;
+        let mut integral = coarse;
+        // As with equal values, four are enough where cells are small.
+        if cell.depth < DEEPEST_DOUBT {
+            let on = self.on;
+            let look = |b| (b, on.density(b).by_area());
+            seen.extend(quarters.iter().flat_map(|q| (0..4).map(move |i| look(middle(quarter(*q, i))))));
+            let fine: f64 = seen[4..].iter().map(|v| v.1).sum::<f64>() / 16.0;
+            // What is left is a curve, of which half the steps leave a fourth (Richardson 1911).
+            integral = (4.0 * fine - coarse) / 3.0;
+            seen.extend((0..3).map(|k| look(tip(cell.corners, k))));
+        }
+        seen.extend(cell.probes.iter().map(|(b, v)| (cell.place(*b), v.by_area())));
+        let is_smooth = is_linear(&seen);
+        if is_smooth {
+            self.bins[cell.bin] += cell.share() * integral;
+        }
+        is_smooth
     }
 
     /// Adds what is known of a cell.
