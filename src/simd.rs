@@ -5,14 +5,47 @@
 //!
 //! AVX-512 needs a compiler that knows it: `build.rs` sets `fanlight_avx512` where it does.
 
-/// Code that is compiled once for each instruction set.
-pub(crate) trait Kernel {
+/// Code that is compiled once for each instruction set. The functions are methods here, as a compiler then works on the
+/// kernels of different modules at the same time.
+pub(crate) trait Kernel: Sized {
     /// Result of the code.
     type Output;
 
     /// Runs the code. Must be `#[inline(always)]`, and so must everything in it that is to be compiled for wider
     /// vectors.
     fn run(self) -> Self::Output;
+
+    /// Runs the code with what the whole program is compiled for. A function of its own beside those for wider
+    /// vectors: inside of each caller, it would be compiled again and again, and never run.
+    #[cfg_attr(all(target_arch = "x86_64", feature = "std"), inline(never))]
+    #[cfg_attr(not(all(target_arch = "x86_64", feature = "std")), inline(always))]
+    fn run_baseline(self) -> Self::Output {
+        self.run()
+    }
+
+    /// Runs the code with 256-bit vectors.
+    ///
+    /// # Safety
+    ///
+    /// The machine must have AVX2.
+    #[cfg(all(target_arch = "x86_64", feature = "std"))]
+    #[target_feature(enable = "avx2")]
+    #[expect(unsafe_code, reason = "the caller has asked the machine")]
+    unsafe fn run_avx2(self) -> Self::Output {
+        self.run()
+    }
+
+    /// Runs the code with 512-bit vectors.
+    ///
+    /// # Safety
+    ///
+    /// The machine must have these instructions.
+    #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
+    #[target_feature(enable = "avx2,avx512f,avx512vl")]
+    #[expect(unsafe_code, reason = "the caller has asked the machine")]
+    unsafe fn run_avx512(self) -> Self::Output {
+        self.run()
+    }
 }
 
 /// Instructions that this machine has: only asking the machine makes one.
@@ -69,13 +102,13 @@ impl InstructionSet {
     )]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
-            VectorExtension::Baseline => kernel.run(),
+            VectorExtension::Baseline => kernel.run_baseline(),
             // SAFETY: a set is made only where the machine has it.
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
-            VectorExtension::Avx2 => unsafe { with_avx2(kernel) },
+            VectorExtension::Avx2 => unsafe { kernel.run_avx2() },
             // SAFETY: as before.
             #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
-            VectorExtension::Avx512 => unsafe { with_avx512(kernel) },
+            VectorExtension::Avx512 => unsafe { kernel.run_avx512() },
         }
     }
 }
@@ -92,26 +125,6 @@ impl VectorExtension {
             Self::Avx512 => std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512vl"),
         }
     }
-}
-
-/// # Safety
-///
-/// The machine must have AVX2. The function is unsafe as a whole for compilers before 1.86.
-#[cfg(all(target_arch = "x86_64", feature = "std"))]
-#[target_feature(enable = "avx2")]
-#[expect(unsafe_code, reason = "the caller has asked the machine")]
-unsafe fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
-}
-
-/// # Safety
-///
-/// The machine must have these instructions.
-#[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
-#[target_feature(enable = "avx2,avx512f,avx512vl")]
-#[expect(unsafe_code, reason = "the caller has asked the machine")]
-unsafe fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run()
 }
 
 /// Requests the cache lines of a value, so that a later read does not wait for all of them.
