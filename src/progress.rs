@@ -21,7 +21,7 @@ pub(crate) struct Progress<'a> {
 }
 
 impl<'a> Progress<'a> {
-    /// Begins work of so many units. A host that is there to be told gets shares of this.
+    /// Begins work of `total` units. A host that is there to be told gets shares of this.
     pub(crate) fn new(report: Option<Report<'a>>, total: f64) -> Self {
         Self { report, total, done: Counter::default() }
     }

@@ -7,7 +7,7 @@ pub(crate) struct Pcg32 {
 }
 
 impl Pcg32 {
-    /// The reference initialisation: `(42, 54)` gives `a15c02b7 7b47f409 ba1d3330`.
+    /// The reference initialization: `(42, 54)` gives `a15c02b7 7b47f409 ba1d3330`.
     pub(crate) fn new(seed: u64, sequence: u64) -> Self {
         let mut pcg = Self { state: 0, increment: (sequence << 1) | 1 };
         pcg.next_u32();

@@ -140,12 +140,12 @@ impl Args {
         Ok(args)
     }
 
-    /// Whether a workload is asked for.
+    /// Whether a workload is selected.
     pub(crate) fn wants(&self, workload: &str) -> bool {
         self.workloads.is_empty() || self.workloads.iter().any(|w| w == workload)
     }
 
-    /// Whether a method is asked for, by its name or by that of its variant.
+    /// Whether a method is selected, by its name or by that of its variant.
     pub(crate) fn wants_method(&self, method: &str, variant: Option<&str>) -> bool {
         let is_same = |asked: &String| match (asked.split_once('@'), variant) {
             (None, _) => asked == method,

@@ -153,7 +153,7 @@ impl Building {
         Self { floors, sky, meshes, lights }
     }
 
-    /// Points on floors and on the walls that look along x, by turns.
+    /// Points alternately on floors and on the walls that look along x.
     fn points(&self, seed: u64, count: usize) -> Vec<ShadingPoint> {
         let mut pcg = Pcg32::new(seed, 2);
         let mut points = vec![];

@@ -14,7 +14,7 @@ use crate::scenes::{self, Scene};
 use crate::timing;
 use crate::variance::{Estimator, Measured};
 
-/// Runs all methods that are asked for on a workload, and prints their rows.
+/// Runs all selected methods on a workload, and prints their rows.
 pub(crate) fn run(name: &str, args: &Args) -> Vec<Row> {
     let (workload, variant) = scenes::workload_and_variant(name);
     if !args.wants(workload) {

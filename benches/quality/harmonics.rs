@@ -9,7 +9,7 @@ use core::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-/// Largest degree that can be asked for.
+/// Largest degree that is supported.
 pub(crate) const MAX_DEGREE: usize = 9;
 
 /// Three functions on the sphere up to a degree, which are the coordinates of a vector.

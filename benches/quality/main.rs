@@ -66,7 +66,7 @@ fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// All workloads and methods that are asked for.
+/// All selected workloads and methods.
 fn table(args: &Args) -> Result<(), Failure> {
     report::print_head();
     let mut rows: Vec<Row> = scenes::NAMES.iter().flat_map(|name| comparison::run(name, args)).collect();

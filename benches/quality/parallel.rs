@@ -5,7 +5,7 @@ use core::num::NonZero;
 /// Maps items, each with its number, on all processors. The order stays.
 pub(crate) fn parallel<T: Sync, R: Send>(items: &[T], map: impl Fn(usize, &T) -> R + Sync) -> Vec<R> {
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
-    // Small blocks by turns, as neighbouring items can be as costly.
+    // Small blocks in alternation, as neighboring items can be as costly.
     let share = |thread: usize| -> Vec<(usize, R)> {
         (thread..items.len()).step_by(threads).map(|i| (i, map(i, &items[i]))).collect()
     };

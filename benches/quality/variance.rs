@@ -9,7 +9,7 @@ use crate::scenes::Scene;
 use crate::scenes::pcg::Pcg32;
 use crate::scenes::sky::{SUN_SAMPLE_SOLID_ANGLE, Sky};
 
-/// Every so manieth direction of the sun stands for its neighbours.
+/// One of this many directions of the sun stands for its neighbors.
 const SUN_STRIDE: usize = 5;
 /// Radiance that only the sun exceeds.
 pub(crate) const BRIGHT: f32 = 2.0;

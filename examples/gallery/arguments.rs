@@ -46,7 +46,7 @@ pub(crate) enum Task {
     Export(PathBuf),
 }
 
-/// What was asked for.
+/// What the command line requests.
 pub(crate) struct Arguments {
     pub(crate) task: Task,
     pub(crate) budget: Budget,
@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Reads the program's arguments. `None` if help was asked for.
+    /// Reads the program's arguments. `None` if help was requested.
     pub(crate) fn parse() -> Result<Option<Self>, Error> {
         let mut arguments = Self {
             task: Task::All,

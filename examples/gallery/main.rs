@@ -1,6 +1,6 @@
 //! Renders a gallery of scenes without and with `fanlight` in the same time, and scenes from glTF files.
 //!
-//! `cargo run --release -p fanlight-gallery -- --help` lists what can be asked for. The renderer is in [`render`]; what
+//! `cargo run --release -p fanlight-gallery -- --help` lists the options. The renderer is in [`render`]; what
 //! it takes to give it `fanlight`'s samplers is in `render/lighting.rs`, and what it takes to guide photons in
 //! `studies/emission.rs`.
 

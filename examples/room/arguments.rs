@@ -31,7 +31,7 @@ Output:
   --exr FILE                  b alone in linear RGB, .exr
 ";
 
-/// What was asked for.
+/// What the command line requests.
 pub(crate) struct Arguments {
     pub(crate) window: Window,
     pub(crate) opening: Opening,
@@ -63,7 +63,7 @@ impl Default for Arguments {
 }
 
 impl Arguments {
-    /// Reads the program's arguments. `None` if help was asked for.
+    /// Reads the program's arguments. `None` if help was requested.
     pub(crate) fn parse() -> Result<Option<Self>, Error> {
         let mut arguments = Self::default();
         let mut parser = lexopt::Parser::from_env();

@@ -1,6 +1,6 @@
 //! Renders a room that daylight enters through a window, without and with portal sampling, in the same time.
 //!
-//! `cargo run --release --example room -- --help` lists what can be asked for. The renderer is in [`render`]; what it
+//! `cargo run --release --example room -- --help` lists the options. The renderer is in [`render`]; what it
 //! takes to give it `fanlight`'s samplers is in `render/lighting.rs`.
 
 mod arguments;
@@ -58,7 +58,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     written
 }
 
-/// The sky that was asked for.
+/// The sky that the command line names.
 fn sky(arguments: &Arguments) -> Result<Sky, Error> {
     match &arguments.environment {
         Some(path) => Ok(Sky::new(read_rgb(path)?)),
@@ -66,7 +66,7 @@ fn sky(arguments: &Arguments) -> Result<Sky, Error> {
     }
 }
 
-/// Writes both images next to each other and, if asked for, the second one in full range.
+/// Writes both images next to each other and, if requested, the second one in full range.
 fn write_images(arguments: &Arguments, a: &Image, b: &Image, reference: &Reference) -> Result<(), Error> {
     picture::write(&arguments.output, &[a, b], reference.image())?;
     match &arguments.exr {
@@ -75,7 +75,7 @@ fn write_images(arguments: &Arguments, a: &Image, b: &Image, reference: &Referen
     }
 }
 
-/// The camera's scale that gives images of a reference's size, unless another one was asked for.
+/// The camera's scale that gives images of a reference's size, unless another one was given.
 fn scale_of(reference: &Image, asked: Option<u32>) -> Result<u32, Error> {
     let (width, height) = (reference.width, reference.height);
     let scale = Camera::scale_of(width, height)

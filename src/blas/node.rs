@@ -48,7 +48,7 @@ impl CellNode {
         bytes.last_chunk().expect("a node is longer than its codes")
     }
 
-    /// Returns the node of a tree that is moved to so many places later in the pool.
+    /// Returns the node of a tree that is moved by `places` in the pool.
     pub(crate) fn moved_by(mut self, places: u32) -> Self {
         self.0[2] = self.0[2].wrapping_add(places);
         self

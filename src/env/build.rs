@@ -234,7 +234,7 @@ fn depth_for(texels: u64) -> u32 {
 fn checked_depth(size: usize) -> Result<u32, Error> {
     let limit = 1 << MAX_PYRAMID_DEPTH;
     if !(1..=limit).contains(&size) {
-        let what = "environment: the resolution asked for";
+        let what = "environment: the requested resolution";
         return Err(Error(ErrorKind::ImageSize { what, width: size, height: size, limit }));
     }
     Ok(size.next_power_of_two().trailing_zeros())

@@ -27,7 +27,7 @@ const BETWEEN_PLACES: f32 = 1.25;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(crate) struct FeatureTexel {
-    /// Morton code of the block in its level of the image: bits of the column and of the row by turns.
+    /// Morton code of the block in its level of the image: interleaved bits of the column and of the row.
     pub(crate) code: u32,
     /// Base-2 logarithm of the number of such blocks along a side of the image.
     pub(crate) level: u32,

@@ -107,7 +107,7 @@ impl EnvironmentView<'_> {
     }
 
     /// Multiplies weights with the radiances of regions over the mean radiance. `fine` are the texels of the size of
-    /// the regions, `cover` those whose filters hold them, where that is asked for. A weight becomes zero only if its
+    /// the regions, `cover` those whose filters hold them, where that is requested. A weight becomes zero only if its
     /// region is black, and what is zero stays so.
     #[inline(always)]
     pub(crate) fn weigh_lanes<const LANES: usize>(

@@ -86,7 +86,7 @@ fn fill_means(depth: u32, means: &mut [f32]) {
     }
 }
 
-/// Computes the means of all levels but the finest anew.
+/// Recomputes the means of all levels but the finest.
 fn coarser_means(depth: u32, means: &[f32]) -> Vec<f32> {
     let mut coarser = vec![0.0; level_start(depth)];
     if depth > 0 {

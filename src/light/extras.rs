@@ -122,8 +122,8 @@ impl<'a> Extras<'a> {
             .map_or_else(ExtrasHeader::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
     }
 
-    /// Returns so many words of an array, after so many of the arrays before. Words that are not there, which
-    /// validation refuses, give none.
+    /// Returns `count` words, after `before` words of the arrays before. Words that are not there, which validation
+    /// refuses, give none.
     #[inline]
     fn words(self, before: usize, count: usize) -> &'a [u32] {
         let start = HEADER + before;
@@ -233,7 +233,7 @@ pub(super) fn add_groups(extras: &mut Vec<u32>, leaves: usize) -> bool {
     is_new
 }
 
-/// Makes room for the light groups of so many leaves, if leaves have light groups, and for more later. Those of the
+/// Makes room for the light groups of `leaves` leaves, if leaves have light groups, and for more later. Those of the
 /// environment stay the last.
 pub(super) fn resize_groups(extras: &mut Vec<u32>, leaves: usize) {
     let groups = Extras(extras).header().groups as usize;

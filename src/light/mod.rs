@@ -88,7 +88,7 @@ buffers! {
         has_lamps: bool,
         /// Whether a ray is known to meet at most one light that shines back along it.
         is_crossed_once: bool,
-        /// Time in the shutter interval, from 0 to 1, at which lights are asked for.
+        /// Time in the shutter interval, from 0 to 1, at which lights are looked up.
         time: f32,
         /// Whether edits may have left places free: then bytes hold another layout.
         is_edited: bool,

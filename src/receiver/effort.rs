@@ -1,7 +1,7 @@
 //! How much a call may do to follow the light.
 
 /// How much a call may do to follow the light at a shading point. Samples and densities are exact at any effort; they
-/// are those of different densities, so that a density must be asked for with the effort that the sample was drawn
+/// are those of different densities, so that a density must be requested with the effort that the sample was drawn
 /// with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]

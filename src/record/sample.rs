@@ -1,4 +1,4 @@
-//! What sampling returns and what a density is asked for.
+//! What sampling returns, and the points whose density can be requested.
 
 use glam::Vec3;
 

@@ -35,7 +35,7 @@ const RAYS_IN_REGION: u64 = 96;
 
 /// Rays for each of the points that regions are divided by. *Chosen*: points may cost as much as rays.
 ///
-/// Larger: regions differ more in the number of their rays. Smaller: more points are asked for.
+/// Larger: regions differ more in the number of their rays. Smaller: more points are requested.
 const COVERED_RAYS: u64 = 4;
 
 /// Largest number of points that regions are divided by. *Chosen*: memory and time of a fraction of a second.

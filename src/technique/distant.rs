@@ -15,7 +15,7 @@ use crate::math::only_if;
 use crate::warp::{Variate, keep_positive, pick, pmf, sum};
 
 /// Distant lights as seen from one shading point: no more than what balances them with the rest, as every shading point
-/// has room for it. Weights are computed anew for each question.
+/// has room for it. Weights are recomputed in each call.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distant {
     irradiance: f32,

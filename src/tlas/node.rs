@@ -22,8 +22,8 @@ pub(super) const MEAN_STEPS: f32 = 127.0;
 /// smaller steps could not reach it, larger ones widen all cones.
 pub(super) const TANGENT_STEPS: f32 = 64.0;
 
-/// Up to `N` children, in few bits each (after Ylitie, Karras and Laine 2017): first other nodes, which are neighbours
-/// in memory, then leaves, whose numbers are neighbours. What proves that a child is dark is rounded to the safe side:
+/// Up to `N` children, in few bits each (after Ylitie, Karras and Laine 2017): first other nodes, which are neighbors
+/// in memory, then leaves, whose numbers are neighbors. What proves that a child is dark is rounded to the safe side:
 /// boxes and cones only grow.
 ///
 /// Numbers of two bytes are the upper half of an `f32`.

@@ -28,7 +28,7 @@ impl LeafKey {
 /// Larger: sums saturate earlier, at 2^32 of these. Smaller: weights are rounded.
 pub(crate) const UNIT: f32 = 64.0;
 
-/// Largest weight of a report. *Chosen*: one report stands for so many at most.
+/// Largest weight of a report. *Chosen*: one report stands for this many at most.
 ///
 /// Larger: single reports speak too loud. Smaller: what a table already hides is overrated.
 const MAX_WEIGHT: f32 = 4.0;

@@ -164,7 +164,7 @@ impl Distiller<'_> {
         }
     }
 
-    /// Appends the nodes so many levels below a node, or the regions above these.
+    /// Appends the nodes `levels` levels below a node, or the regions above these.
     fn below(&self, node: usize, levels: u32, nodes: &mut Vec<usize>) {
         match self.regions.halves(node) {
             Ok(halves) if levels > 0 => halves.iter().for_each(|half| self.below(*half, levels - 1, nodes)),

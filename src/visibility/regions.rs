@@ -170,7 +170,7 @@ impl RegionBuilder {
         self.extents.fill(RegionExtent::EMPTY);
     }
 
-    /// Returns the nodes as a table holds them, with regions numbered anew: `number` returns the new number, or `None`
+    /// Returns the nodes as a table holds them, with regions renumbered: `number` returns the new number, or `None`
     /// for a region of which nothing is known. What is far from all reports is in no region.
     pub(crate) fn freeze(&self, number: impl Fn(u32) -> Option<u32>) -> Vec<RegionNode> {
         let nothing = RegionNode { kind: NOTHING, plane: 0.0, first: 0 };

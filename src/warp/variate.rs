@@ -22,7 +22,7 @@ const STEP: f64 = f64::EPSILON / 2.0;
 /// Every discrete choice spends bits: the part of the unit interval that was chosen is stretched to all of it.
 /// An `f32` is empty after some 24 binary choices. This holds a double, whose low bits are a hash from the
 /// start; when choices have used up its leading bits, those steps that still tell inputs apart are kept and
-/// everything below them is hashed anew. So the leading structure of a stratified input is never disturbed.
+/// everything below them is hashed again. So the leading structure of a stratified input is never disturbed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Variate {
     /// In `[0, 1)`.

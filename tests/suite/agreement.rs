@@ -120,7 +120,7 @@ fn examine(number: usize, samples: usize, every: usize, make: MakePoint) -> Coun
     counts
 }
 
-/// With so many samples of a scene in the full tier.
+/// With this many samples of a scene in the full tier.
 fn examine_all(full: usize, make: MakePoint) {
     let mut all = Counts::default();
     let scenes = tier().scenes;

@@ -15,7 +15,7 @@ use glam::{Vec2, Vec3};
 /// pairs takes hours.
 const LONGER: u32 = 5;
 
-/// A mesh of small triangles at centres; far away larger ones, so that rounding leaves them an area.
+/// A mesh of small triangles at centers; far away larger ones, so that rounding leaves them an area.
 fn add(builder: &mut LightSamplerBuilder<'_>, count: u32, center: impl Fn(u32) -> Vec3) {
     let corners = [Vec3::ZERO, Vec3::new(1e-3, 0.0, 0.0), Vec3::new(0.0, 1e-3, 2e-4)];
     let place = |i: u32, corner: Vec3| center(i) + corner * (1.0 + center(i).length());

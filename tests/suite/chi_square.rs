@@ -6,7 +6,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LEAST_EFFORT, LOBES, MICROFACETS, Scene, point_of_kind, random_point};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
-use crate::common::tier::{few, fewer, tier, two_of_five};
+use crate::common::tier::{few, fewer, some_slow, tier};
 use fanlight::{Arity, Hit, ShadingPoint, Splitting};
 use glam::Vec3;
 
@@ -97,7 +97,7 @@ fn contents() -> Vec<Content> {
 
 #[test]
 fn samples_fill_the_cells_of_triangles_as_the_density_says() {
-    check_cells(0, two_of_five);
+    check_cells(0, some_slow);
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn triangles_are_chosen_with_their_probability() {
     }
 }
 
-/// One split gives no triangle twice, so that each triangle's count is binomial whatever its neighbours do.
+/// One split gives no triangle twice, so that each triangle's count is binomial whatever its neighbors do.
 #[test]
 fn splitting_visits_triangles_as_often_as_it_expects() {
     let settings = [(0.5, 1, 200_000), (0.9, 2, 120_000), (1.0, 2, 10_000)];

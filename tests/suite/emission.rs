@@ -194,7 +194,7 @@ fn passes_an_edge(scene: &Scene, point: Vec3, along: Vec3) -> bool {
     })
 }
 
-/// A ray's own density, asked for where it has landed, counts the opening that it came through, whatever rounding does;
+/// A ray's own density, evaluated where it has landed, counts the opening that it came through, whatever rounding does;
 /// apart from the edges it is the density of any ray there.
 #[test]
 fn the_density_of_a_landed_ray_is_never_below_its_own() {

@@ -155,7 +155,7 @@ fn directions_are_drawn_with_their_density() {
     });
 }
 
-/// Every number of a sample of the environment, and its density when it is asked for.
+/// Every number of a sample of the environment, and its density when it is looked up.
 fn check(at: &PointSampler<'_>, x: &ShadingPoint, sample: &LightSample) {
     assert!(sample.direction.is_normalized() && sample.position.is_finite(), "{sample:?}");
     assert_eq!((sample.hit(), sample.distance, sample.normal), (None, f32::INFINITY, -sample.direction));

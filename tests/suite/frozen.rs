@@ -102,7 +102,7 @@ fn path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/frozen").join(name)
 }
 
-/// Returns the bytes of a file, after writing them if that is asked for.
+/// Returns the bytes of a file, after writing them if that is requested.
 fn frozen(name: &str, bytes: impl Fn() -> Vec<u8>) -> Vec<u32> {
     if std::env::var("FROZEN").is_ok_and(|value| value == "write") {
         std::fs::write(path(name), bytes()).expect("the file can be written");

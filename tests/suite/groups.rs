@@ -87,7 +87,7 @@ fn point(i: usize, pcg: &mut Pcg32) -> ShadingPoint {
     x.with_groups([1, 3, 6, 0x80, u32::MAX, 0][i % 6])
 }
 
-/// Density of the light of a sample, asked for by its id, and the probability of the light.
+/// Density of the light of a sample, looked up by its id, and the probability of the light.
 fn again(lights: &LightSampler, x: &ShadingPoint, sample: &LightSample) -> (f32, f32) {
     let at = lights.at(x);
     match sample.light {

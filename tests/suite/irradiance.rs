@@ -68,7 +68,7 @@ fn estimate(scene: &Scene, lights: &LightSampler, x: &ShadingPoint, estimator: E
     mean
 }
 
-/// One family of scenes: the scene and shading point of a number, and the integral with so many points.
+/// One family of scenes: the scene and shading point of a number, and the integral with a number of points.
 struct Case {
     name: &'static str,
     scene: fn(&mut Pcg32, usize) -> (Scene, ShadingPoint),
@@ -350,7 +350,7 @@ fn adaptive_splitting() {
     assert_unbiased(&Case { name: "adaptive splitting", scene, integral: over_lights, estimator });
 }
 
-/// A large opening, and one a tenth its size in front of it with a texture, one metre apart.
+/// A large opening, and one a tenth its size in front of it with a texture, one meter apart.
 fn nested(pcg: &mut Pcg32, number: usize) -> (Scene, ShadingPoint) {
     let outer = LightMesh::quad(Vec3::new(-2.5, -2.5, 1.0), 5.0 * Vec3::Y, 5.0 * Vec3::X).portal();
     let inner = LightMesh::quad(Vec3::new(-0.25, -0.25, 0.0), 0.5 * Vec3::Y, 0.5 * Vec3::X).portal();

@@ -72,7 +72,7 @@ pub(crate) fn mixed(pcg: &mut Pcg32, number: usize) -> (LightSampler, Vec<Kind>)
     (lights, lamps)
 }
 
-/// Density of the light of a sample, asked for by its id.
+/// Density of the light of a sample, looked up by its id.
 pub(crate) fn pdf_again(at: &PointSampler<'_>, sample: &LightSample) -> f32 {
     match sample.light {
         SampledLight::Triangle(hit) => at.pdf(&hit),

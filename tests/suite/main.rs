@@ -36,7 +36,7 @@ mod layering;
 mod memory;
 mod motion;
 mod near;
-mod normalisation;
+mod normalization;
 mod procedural;
 mod profiles;
 mod projections;

@@ -7,7 +7,7 @@ use crate::common::tier::tier;
 
 const UVS: [Vec2; 4] = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
 
-/// Bytes of the trees over textures of so many windows with the same image.
+/// Bytes of the trees over textures of a number of windows with the same image.
 fn cells(windows: usize, texture: Texture<'_>) -> usize {
     let mut builder = LightSampler::builder();
     let texture = builder.add_texture(texture);
@@ -51,7 +51,7 @@ fn a_large_image_takes_at_most_two_bytes_a_texel() {
     assert!(cells(1, Texture::new(1024, 1024, &ring(1024)).expect("the image is finite")) < bytes / 4);
 }
 
-/// Where every triangle has coordinates of its own, a small image has still only so much for all of them.
+/// Where every triangle has coordinates of its own, a small image still has one budget for all of them.
 #[test]
 fn many_triangles_share_what_a_small_image_may_take() {
     let texels = ring(16);

@@ -370,7 +370,7 @@ fn photons_leave_at_their_time() {
         let irradiance = (0..grid * grid).map(|i| {
             let [s, t] = [i % grid, i / grid].map(|k| (k as f32 + 0.5) * cell - 0.5 * side);
             let x = ShadingPoint::surface(Vec3::new(s, t, height), Vec3::Z);
-            // So many that texels are resolved, as all points of the floor look at the same places of a light.
+            // Enough that texels are resolved, as all points of the floor look at the same places of a light.
             oracle::over_lights(&now.flat, &x, None, 1 << 16, &|m, t, b, direction| {
                 oracle::sent(&now.flat, m, t, b, direction)
             })

@@ -1,4 +1,4 @@
-//! A sampler whose lights have moved or changed their brightness keeps all promises of one that was built anew.
+//! A sampler whose lights have moved or changed their brightness keeps all promises of one that was freshly built.
 
 use crate::common::density::{OnTriangle, id, probes};
 use crate::common::pcg::Pcg32;

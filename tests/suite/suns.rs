@@ -14,7 +14,7 @@ fn sun_direction() -> Vec3 {
     Vec3::new(0.3, 0.8, 0.5).normalize()
 }
 
-/// A grey sky with a sun of one degree's radius, which a latitude-longitude image of many texels resolves.
+/// A gray sky with a sun of one degree's radius, which a latitude-longitude image of many texels resolves.
 fn environment() -> Environment {
     let (width, height) = (2 * SIZE, SIZE);
     let texel = |i: usize| {
@@ -27,13 +27,13 @@ fn environment() -> Environment {
     Environment::from_lat_long(width, height, &image, Filter::Nearest).expect("the texels are finite")
 }
 
-/// What the wall at `y = 0` has for openings, in a square of one metre around the window's middle.
+/// What the wall at `y = 0` has for openings, in a square of one meter around the window's middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wall {
     Window,
     /// A window, and a larger one behind it.
     Nested,
-    /// So many holes a side, each of half the pitch.
+    /// This many holes a side, each of half the pitch.
     Holes(i32),
     /// The same as a window with a clip map.
     Clipped(i32),

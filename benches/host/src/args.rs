@@ -43,7 +43,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Reads the command line. `None` if only help is asked for.
+    /// Reads the command line. `None` if only help is requested.
     pub(crate) fn parse() -> Result<Option<Self>, Error> {
         let (mut seeds, mut seconds) = (None, None);
         let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

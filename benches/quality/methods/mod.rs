@@ -53,7 +53,7 @@ pub(crate) trait Method: Sync {
         self.sample(x, u).map(|drawn| drawn.pdf)
     }
 
-    /// Density per solid angle of what a method drew, found anew.
+    /// Density per solid angle of what a method drew, evaluated independently of the draw.
     fn pdf(&self, x: &ShadingPoint, drawn: &Drawn) -> f64;
 
     /// Probability of choosing each light that is `wanted`, or `None` if the method chooses none.

@@ -37,7 +37,7 @@ pub(crate) fn pieces(light: &Light, image: &Image) -> Vec<Piece> {
 /// Patches that differ from the background, runs of the same constant value in one.
 fn patches(image: &Image) -> Vec<Patch> {
     let n = image.size as i64;
-    // Patches of a bilinear look-up have their corners at texel centres.
+    // Patches of a bilinear lookup have their corners at texel centers.
     let (range, shift) = match image.filter {
         Filter::Nearest => (0..n, 0.0),
         Filter::Bilinear => (-1..n, 0.5),

@@ -1,4 +1,4 @@
-//! Small multiples on logarithmic axes, with one colour for each name in all of them and one legend below.
+//! Small multiples on logarithmic axes, with one color for each name in all of them and one legend below.
 
 use core::ops::Range;
 use std::path::Path;
@@ -9,7 +9,7 @@ use plotters::prelude::*;
 
 use crate::Failure;
 
-/// Distinguishable colours: those of Okabe and Ito (2008), and darker ones.
+/// Distinguishable colors: those of Okabe and Ito (2008), and darker ones.
 const COLORS: [RGBColor; 14] = [
     RGBColor(0, 0, 0),
     RGBColor(230, 159, 0),
@@ -60,7 +60,7 @@ pub(crate) struct Panels {
     /// Of the horizontal and the vertical axis.
     pub(crate) labels: [&'static str; 2],
     pub(crate) style: Style,
-    /// All names there are, in the order of their colours; those that appear in no panel are left out of the legend.
+    /// All names there are, in the order of their colors; those that appear in no panel are left out of the legend.
     pub(crate) names: Vec<String>,
     /// What rings stand for, if there are any.
     pub(crate) open: &'static str,

@@ -1,4 +1,4 @@
-//! Textures, and their look-up in double precision.
+//! Textures, and their lookup in double precision.
 
 use core::f64::consts::PI;
 
@@ -19,7 +19,7 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    /// Texels from a function of the texture coordinates of their centres.
+    /// Texels from a function of the texture coordinates of their centers.
     fn from_fn(size: usize, filter: Filter, background: f32, value: impl Fn(DVec2) -> f32) -> Self {
         let center = |i: usize| (i as f64 + 0.5) / size as f64;
         let texels = (0..size * size).map(|k| value(DVec2::new(center(k % size), center(k / size)))).collect();

@@ -18,7 +18,7 @@ use points::PointSet;
 use sky::Sky;
 use wall::Wall;
 
-/// All workloads, in the order of the table; after an `@`, another way to hand over the same light.
+/// All workloads, in the order of the table; after an `@`, another way to pass the same light.
 pub(crate) const NAMES: [&str; 15] = [
     "cloud-10000",
     "cloud-100000",
@@ -203,7 +203,7 @@ impl Scene {
         if let Weight::Constant(weight) = self.lights[light].weight {
             return f64::from(weight);
         }
-        // Centres of the cells of a regular subdivision, two along a texel.
+        // Centers of the cells of a regular subdivision, two along a texel.
         let [a, b, c] = self.lights[light].uvs;
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         let n = self.image.as_ref().map_or(1, |image| (2.0 * longest * image.size as f64).ceil() as usize).max(1);

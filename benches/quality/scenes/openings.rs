@@ -32,7 +32,7 @@ pub(crate) fn grid_clip(k: usize) -> Scene {
     Scene::portals(vec![wall], Some(Image::grid(k)))
 }
 
-/// A large opening, and a metre in front of it another wall with one of a tenth of its size. From behind both, only
+/// A large opening, and a meter in front of it another wall with one of a tenth of its size. From behind both, only
 /// what lies behind both openings is seen.
 pub(crate) fn nested() -> Scene {
     let inner = Wall { y: -1.0, ..wall(0.2, Opening::Whole) };

@@ -54,7 +54,7 @@ fn curves(world: &World, window: &str, bounces: u32, effort: &Effort) -> Vec<Ser
     let reference = Reference::from_film(&reference);
     let empty = |name: &str| Series { name: name.to_owned(), open: false, marks: vec![] };
     let mut series = STRATEGIES.map(|(name, _)| empty(name));
-    // By turns, so that both have the machine to themselves as much.
+    // Alternately, so that both have the machine to themselves as much.
     for i in (0..effort.images).rev() {
         for ((name, strategy), series) in STRATEGIES.into_iter().zip(&mut series) {
             let (film, seconds) = render(strategy, i + 1, effort.seconds * 0.5_f64.powi(i as i32));

@@ -73,7 +73,7 @@ impl Study<'_> {
         }
     }
 
-    /// The fewest levels that can give so many samples, and the threshold that gives about so many.
+    /// The fewest levels that can give the number of samples, and the threshold that gives about that number.
     fn splitting(&self, count: f64) -> Splitting {
         let can = |levels: &u32| self.count(&Splitting::new(1.0, *levels)) >= count;
         let levels = (1..LEVELS).find(can).unwrap_or(LEVELS);
@@ -124,7 +124,7 @@ impl Study<'_> {
         summary(parallel(&self.points, at_point).into_iter()).expect("there are points")
     }
 
-    /// Times of sets, taken by turns.
+    /// Times of sets, taken alternately.
     fn nanoseconds(&self, ways: &[Way], effort: &Effort) -> Vec<f64> {
         let points = self.scene.points.timing(effort.calls);
         let mut pcg = Pcg32::new(3, 3);

@@ -1,6 +1,6 @@
 //! The terms that can guide the descent inside a triangle, on one triangle: `-- --terms` prints a table.
 //!
-//! No Monte Carlo: the density is asked for in the middle of 4,096 cells, and set against the true contribution.
+//! No Monte Carlo: the density is evaluated in the middle of 4,096 cells, and set against the true contribution.
 
 use core::hint::black_box;
 use std::time::Instant;
@@ -138,7 +138,7 @@ fn texel([u, v]: [f64; 2]) -> usize {
     (v * TEXELS as f64) as usize * TEXELS + (u * TEXELS as f64) as usize
 }
 
-/// Centres of all cells.
+/// Centers of all cells.
 fn places() -> impl Iterator<Item = [f64; 2]> {
     let center = |i: u32, third: u32| f64::from(3 * i + third) / f64::from(3 * CELLS);
     (0..CELLS).flat_map(move |i| {

@@ -13,13 +13,13 @@ const U32: u32 = 5125;
 const F32: u32 = 5126;
 
 impl Data<'_> {
-    /// Elements of so many floats. Integers become floats, from −1 to 1 if they are normalized.
+    /// Elements of `N` floats. Integers become floats, from −1 to 1 if they are normalized.
     pub(super) fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>, Error> {
         let normalized = member(&self.document.accessors, "accessor", index)?.normalized;
         self.elements(index, |kind, bytes| float(kind, normalized, bytes))
     }
 
-    /// Elements of so many whole numbers.
+    /// Elements of `N` whole numbers.
     pub(super) fn integers<const N: usize>(&self, index: usize) -> Result<Vec<[u32; N]>, Error> {
         self.elements(index, integer)
     }

@@ -26,7 +26,7 @@ impl Limits {
     pub(crate) const RENDERABLE: Self = Self { triangles: 50_000_000, bytes: 1 << 30 };
 }
 
-/// The bytes of a file, read when they are first asked for.
+/// The bytes of a file, read when they are first needed.
 pub(super) struct Data<'a> {
     pub(super) document: &'a Document,
     /// Where the file lies; without it nothing outside of the file is read.

@@ -21,7 +21,7 @@ const PADDING: usize = 4;
 /// Largest element in bytes. *Format.*
 const LARGEST: usize = 256;
 
-/// Unpacks so many elements of so many bytes.
+/// Unpacks a number of elements of the given size in bytes.
 pub(super) fn decode(source: &[u8], count: usize, stride: usize, mode: &str, filter: &str) -> Result<Vec<u8>, Error> {
     let mut bytes = match mode {
         "ATTRIBUTES" => attributes(source, count, stride)?,
@@ -58,7 +58,7 @@ impl<'a> Cursor<'a> {
         Ok(self.take(1)?[0])
     }
 
-    /// Refuses data that is longer or shorter than so many bytes before its end.
+    /// Refuses data that is longer or shorter than it should be, up to its tail.
     fn ends_before(&self, rest: usize) -> Result<(), Error> {
         if self.at + rest == self.bytes.len() { Ok(()) } else { Err("its data is of another length".into()) }
     }
@@ -149,7 +149,7 @@ fn block_of_deltas(
     Ok(deltas)
 }
 
-/// Differences of so many bits. The largest of them says that a whole byte follows.
+/// Differences of the given number of bits. The largest of them says that a whole byte follows.
 fn group_of_deltas(cursor: &mut Cursor<'_>, bits: usize, deltas: &mut [u8]) -> Result<(), Error> {
     if bits == 0 {
         return Ok(());
@@ -212,7 +212,7 @@ impl<T: Copy + Default, const N: usize> Recent<T, N> {
         value
     }
 
-    /// The value that was pushed so many pushes before the last one.
+    /// The value that was pushed the given number of pushes before the last one.
     fn get(&self, age: usize) -> T {
         self.values[(self.next + 2 * N - 1 - age) % N]
     }
@@ -368,7 +368,7 @@ fn quaternions(bytes: &mut [u8]) {
     }
 }
 
-/// Colors as brightness and two differences, with a scale in the alpha's highest bit; of so many bytes a channel.
+/// Colors as brightness and two differences, with a scale in the alpha's highest bit; a channel takes `BYTES` bytes.
 fn colors<const BYTES: usize>(bytes: &mut [u8]) {
     for color in bytes.chunks_exact_mut(4 * BYTES) {
         let bits =

@@ -66,7 +66,7 @@ struct Buffer {
 }
 
 impl Buffer {
-    /// Appends an array of so many elements; returns its accessor.
+    /// Appends an array of the given number of elements; returns its accessor.
     fn add(&mut self, bytes: &[u8], count: usize, kind: [Value; 2], target: u32) -> usize {
         self.views.push(json!({
             "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len(), "target": target,

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec4, vec2};
 
 use super::lighting::{Filter, Wrap};
 
-/// An image with alpha, of colours that are stored as 8 bits in sRGB. Row 0 lies at `v = 0`.
+/// An image with alpha, of colors that are stored as 8 bits in sRGB. Row 0 lies at `v = 0`.
 #[derive(Clone, Debug)]
 pub(crate) struct Bitmap {
     pub(crate) width: usize,
@@ -20,7 +20,7 @@ impl Bitmap {
         Self { width, height, bytes, filter: Filter::Nearest, wrap: [Wrap::Clamp; 2] }
     }
 
-    /// Draws linear colours by the middles of texels.
+    /// Draws linear colors by the middles of texels.
     pub(crate) fn draw(width: usize, height: usize, color: impl Fn(Vec2) -> Vec4) -> Self {
         let size = vec2(width as f32, height as f32);
         let texel = |i: usize| {
@@ -35,7 +35,7 @@ impl Bitmap {
         Self::draw(width, height, |uv| Vec4::new(1.0, 1.0, 1.0, if is_open(uv) { 0.0 } else { 1.0 }))
     }
 
-    /// Linear colour and alpha at a place.
+    /// Linear color and alpha at a place.
     pub(crate) fn at(&self, uv: Vec2) -> Vec4 {
         let place = uv * vec2(self.width as f32, self.height as f32);
         match self.filter {
@@ -57,7 +57,7 @@ impl Bitmap {
         texel.map(|byte| f32::from(byte) / 255.0)
     }
 
-    /// Linear colour and alpha of all texels.
+    /// Linear color and alpha of all texels.
     pub(crate) fn texels(&self) -> impl Iterator<Item = Vec4> {
         self.bytes.iter().map(|&bytes| decode(bytes))
     }

@@ -136,7 +136,7 @@ impl Lights {
         Self { tells_lobes: false, ..self }
     }
 
-    /// The same with what walls hide from the surfaces that a camera sees, learned by so many rays.
+    /// The same with what walls hide from the surfaces that a camera sees, learned with the given number of rays.
     pub(crate) fn learned(mut self, world: &World, camera: &Camera, rays: u64) -> Result<Self, Error> {
         let point = |i: u64| {
             let mut random = Random::new(i, LEARNING);

@@ -26,9 +26,9 @@ pub(crate) struct Material {
     pub(crate) name: String,
     pub(crate) lobe: Lobe,
     pub(crate) color: Vec3,
-    /// Multiplies the colour.
+    /// Multiplies the color.
     pub(crate) color_map: Option<usize>,
-    /// Whether the colour map's alpha is a mask: where it is below one half there is a hole.
+    /// Whether the color map's alpha is a mask: where it is below one half there is a hole.
     pub(crate) masked: bool,
     pub(crate) emission: Vec3,
     /// Multiplies the emission.
@@ -85,7 +85,7 @@ impl Material {
         self.masked || self.lobe == Lobe::Clear
     }
 
-    /// Colour at a place.
+    /// Color at a place.
     pub(crate) fn color_at(&self, bitmaps: &[Bitmap], uv: Vec2) -> Vec3 {
         self.color_map.map_or(self.color, |map| self.color * bitmaps[map].at(uv).truncate())
     }

@@ -64,7 +64,7 @@ impl Mesh {
         self
     }
 
-    /// Adds an upright box that is turned about the vertical through its centre.
+    /// Adds an upright box that is turned about the vertical through its center.
     pub(crate) fn block(mut self, center: Vec3, size: Vec3, turn: f32) -> Self {
         let rotation = glam::Mat3::from_rotation_y(turn);
         let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z].map(|axis| rotation * axis);
@@ -76,7 +76,7 @@ impl Mesh {
         self
     }
 
-    /// Adds a sphere of so many rings, facing outwards.
+    /// Adds a sphere of the given number of rings, facing outwards.
     pub(crate) fn sphere(mut self, center: Vec3, radius: f32, rings: u32) -> Self {
         self.grid([2 * rings, rings], |at| {
             let (sin_phi, cos_phi) = (TAU * at.x).sin_cos();
@@ -111,7 +111,7 @@ impl Mesh {
         self
     }
 
-    /// Adds a surface of so many columns and rows; `u` to `v` turns counter-clockwise around its front.
+    /// Adds a surface of the given columns and rows; `u` to `v` turns counter-clockwise around its front.
     pub(crate) fn grid(&mut self, [columns, rows]: [u32; 2], position: impl Fn(Vec2) -> Vec3) {
         let first = self.positions.len() as u32;
         for row in 0..=rows {

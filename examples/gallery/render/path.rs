@@ -25,7 +25,7 @@ pub(crate) struct PathTracer<'a> {
 }
 
 impl<'a> PathTracer<'a> {
-    /// An integrator for paths of up to so many bounces.
+    /// An integrator for paths of up to the given number of bounces.
     pub(crate) fn new(world: &'a World, techniques: &'a Techniques, bounces: u32) -> Self {
         let photons = (techniques.photons && bounces > 1).then(|| PhotonTracer::new(world, &techniques.lights));
         Self { world, techniques, bounces, photons }

@@ -11,7 +11,7 @@ impl Random {
         Self(Pcg32::new(state, stream))
     }
 
-    /// So many numbers.
+    /// The next `N` numbers.
     pub(crate) fn take<const N: usize>(&mut self) -> [f32; N] {
         core::array::from_fn(|_| self.one())
     }

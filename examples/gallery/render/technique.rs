@@ -98,7 +98,7 @@ impl Techniques {
         Self { lights: self.lights.without_lobes(), ..self }
     }
 
-    /// The same with what walls hide from the surfaces that a camera sees, learned by so many rays.
+    /// The same with what walls hide from the surfaces that a camera sees, learned with the given number of rays.
     pub(crate) fn learned(self, world: &World, camera: &Camera, rays: u64) -> Result<Self, Error> {
         Ok(Self { lights: self.lights.learned(world, camera, rays)?, ..self })
     }

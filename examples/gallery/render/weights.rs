@@ -52,7 +52,7 @@ pub(super) fn emission<'a>(model: &'a Model, material: &Material) -> Weights<'a>
     })
 }
 
-/// Luminance of a material's colour.
+/// Luminance of a material's color.
 pub(super) fn colored<'a>(model: &'a Model, material: &Material) -> Weights<'a> {
     let color = material.color;
     Weights::new(model, material.color_map, LUMINANCE.dot(color), |texel| LUMINANCE.dot(color * texel.truncate()))

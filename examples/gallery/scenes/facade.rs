@@ -14,7 +14,7 @@ pub(crate) fn overcast_facade(rows: u32) -> Model {
     model
 }
 
-/// The hall with so many rows and columns of windows, each half as wide and half as high as their pitch.
+/// The hall with the given rows and columns of windows, each half as wide and half as high as their pitch.
 pub(crate) fn facade(rows: u32, sky: Sky) -> Model {
     let camera = Camera::looking(vec3(26.0, 6.0, 16.0), vec3(8.0, 2.5, 6.0), 60.0);
     let mut model = Model::new(camera, Some(sky));

@@ -1,4 +1,4 @@
-//! The built-in scenes. Lengths are metres, y is up, and the sun stands towards -x.
+//! The built-in scenes. Lengths are meters, y is up, and the sun stands towards -x.
 
 extern crate alloc;
 

@@ -39,7 +39,7 @@ pub(crate) fn neon() -> Model {
     model
 }
 
-/// Colour of all light: what is left of the noise is that of places, not of colours.
+/// Color of all light: what is left of the noise is that of places, not of colors.
 const GLOW: Vec3 = vec3(1.0, 0.5, 0.42);
 
 /// Thin strokes of letters and two bands, on a wall that is dark but for them.

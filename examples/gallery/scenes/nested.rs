@@ -1,4 +1,4 @@
-//! A small opening behind a large one: two walls, a metre apart.
+//! A small opening behind a large one: two walls, a meter apart.
 
 use glam::{Vec2, Vec3, vec2, vec3};
 

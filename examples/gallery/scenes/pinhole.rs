@@ -1,4 +1,4 @@
-//! A camera obscura: a dark box, a hole of twelve millimetres made by a clip map, and what is outside on the back wall.
+//! A camera obscura: a dark box, a hole of twelve millimeters made by a clip map, and what is outside on the back wall.
 
 use glam::{Vec2, Vec3, vec2, vec3};
 
@@ -18,7 +18,7 @@ pub(crate) fn pinhole() -> Model {
     model
 }
 
-/// A street: houses in four colours with windows, a lawn, a blue sky and a low sun.
+/// A street: houses in four colors with windows, a lawn, a blue sky and a low sun.
 fn street(direction: Vec3) -> Vec3 {
     let place = vec2(direction.z, direction.y) / -direction.x.min(-1e-3);
     let sun = vec3(-0.85, 0.42, 0.3).normalize();

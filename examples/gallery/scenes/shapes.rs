@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3, vec2, vec3};
 
 use crate::render::{Bitmap, Image, Material, Mesh, Model, Sky, direction_of};
 
-/// Five-pointed star: ten points by turns on a circle of this radius and on one of 0.4 times that.
+/// Five-pointed star: ten points alternately on a circle of this radius and on one of 0.4 times that.
 pub(crate) fn star(center: Vec2, radius: f32) -> Vec<Vec2> {
     let point = |k: u8| {
         let radius = if k.is_multiple_of(2) { radius } else { 0.4 * radius };
@@ -47,7 +47,7 @@ pub(crate) fn card(mesh: Mesh, x: f32, low: Vec2, high: Vec2) -> Mesh {
     mesh.quad(vec3(x, high.x, low.y), Vec3::Z * size.y, Vec3::NEG_Y * size.x)
 }
 
-/// Floor, ceiling and the three walls that are not at x = 0, each of its colour.
+/// Floor, ceiling and the three walls that are not at x = 0, each of its color.
 pub(crate) fn walls(model: &mut Model, size: Vec3, [floor, walls, side]: [Vec3; 3]) {
     let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
     let mesh = model.material(Material::new("floor", floor)).quad(Vec3::ZERO, z, x);
@@ -77,7 +77,7 @@ pub(crate) fn overcast(direction: Vec3) -> Vec3 {
     vec3(0.9, 0.97, 1.1) * (1.0 + 2.0 * direction.y) / 3.0
 }
 
-/// The same with a sun behind thin clouds: so bright, and spread over so many degrees.
+/// The same with a sun behind thin clouds: of this brightness, spread over this many degrees.
 pub(crate) fn hazy(sun: Vec3, brightness: f32, degrees: f32) -> Sky {
     painted_sky(|direction| {
         let distance = direction.angle_between(sun).to_degrees() / degrees;

@@ -19,7 +19,7 @@ const REFERENCE_FACTOR: u32 = 64;
 const TIMED_FACTOR: u32 = 16;
 /// Photons that are traced in one piece.
 const PIECE: u32 = 5_000;
-/// The floor, in metres along z and x, and its cells.
+/// The floor, in meters along z and x, and its cells.
 const FLOOR: [f32; 2] = [6.0, 5.0];
 const CELLS: [usize; 2] = [192, 160];
 /// Height of the room.

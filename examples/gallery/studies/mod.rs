@@ -49,7 +49,7 @@ pub(crate) fn without_and_with(
     if !model.lamps.is_empty() {
         contestants.remove(0);
     }
-    let mut last = Err("no number of bounces was asked for".into());
+    let mut last = Err("no number of bounces was given".into());
     for &bounces in bounces {
         let title = format!("{name}, {bounces} bounce{}", if bounces == 1 { "" } else { "s" });
         last = Ok(compare(&title, &world, model.camera, bounces, &contestants, effort)?);

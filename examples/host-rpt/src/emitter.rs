@@ -17,7 +17,7 @@ pub(crate) struct Emitter {
 }
 
 impl Emitter {
-    /// A grid of so many cells over the unit square, whose front is where `u` to `v` turns counter-clockwise.
+    /// A grid of the given cells over the unit square, whose front is where `u` to `v` turns counter-clockwise.
     pub(crate) fn new(
         [columns, rows]: [u32; 2],
         position: impl Fn(f64, f64) -> DVec3,

@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
     Ok(())
 }
 
-/// The scene with one more light. Radiance is in the shape's density, and the colour here.
+/// The scene with one more light. Radiance is in the shape's density, and the color here.
 fn lit(mut scene: Scene, shape: impl Shape + 'static) -> Scene {
     scene.add(Light::Object(Object::new(shape).material(Material::light(glm::vec3(1.0, 0.85, 0.7), 1.0))));
     scene

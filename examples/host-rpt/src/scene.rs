@@ -26,8 +26,8 @@ pub(crate) fn emitters() -> Vec<Emitter> {
 /// Everything but the lights.
 pub(crate) fn scene() -> Scene {
     let mut scene = Scene::new();
-    let grey = |x: f64| Material::diffuse(vec3(x, x, x));
-    scene.add(Object::new(plane(vec3(0.0, 1.0, 0.0), 0.0)).material(grey(0.6)));
+    let gray = |x: f64| Material::diffuse(vec3(x, x, x));
+    scene.add(Object::new(plane(vec3(0.0, 1.0, 0.0), 0.0)).material(gray(0.6)));
     scene.add(Object::new(plane(vec3(0.0, 0.0, 1.0), -2.5)).material(Material::diffuse(vec3(0.5, 0.55, 0.6))));
     let ball = |center: DVec3, radius: f64| sphere().scale(&vec3(radius, radius, radius)).translate(&center);
     scene.add(Object::new(ball(vec3(-1.2, 0.6, -0.4), 0.6)).material(Material::diffuse(vec3(0.8, 0.3, 0.2))));

@@ -22,7 +22,7 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// The camera with so many times the pixels along each side.
+    /// The camera with the given multiple of the pixels along each side.
     pub(crate) fn scaled(scale: u32) -> Self {
         let backward = (POSITION - TARGET).normalize();
         let right = Vec3::Y.cross(backward).normalize();

@@ -19,7 +19,7 @@ const TURBIDITY: f64 = 3.0;
 const SUN: DVec3 = dvec3(-0.813_797_681, 0.5, 0.296_198_133);
 /// Half the angle that the sun's disc is seen under.
 const SUN_RADIUS: f64 = 0.00465;
-/// Colour of sunlight at this height.
+/// Color of sunlight at this height.
 const SUN_COLOR: Vec3 = Vec3::new(1.15, 0.98, 0.75);
 /// Share of the light that the ground outside reflects.
 const GROUND_ALBEDO: f32 = 0.15;

@@ -32,7 +32,7 @@ impl Random {
         Self(Pcg32::new(state, stream))
     }
 
-    /// So many numbers.
+    /// The next `N` numbers.
     pub(crate) fn take<const N: usize>(&mut self) -> [f32; N] {
         core::array::from_fn(|_| (self.0.next_u32() >> 8) as f32 / (1 << 24) as f32)
     }
@@ -58,7 +58,7 @@ struct Vertex<'a> {
 }
 
 impl<'a> PathTracer<'a> {
-    /// An integrator for paths of up to so many bounces.
+    /// An integrator for paths of up to the given number of bounces.
     pub(crate) fn new(world: &'a World, strategy: Strategy, bounces: u32) -> Self {
         let photons = (strategy == Strategy::EnvironmentAndPortals && bounces > 1).then(|| PhotonTracer::new(world));
         Self { world, strategy, bounces, photons }

@@ -14,12 +14,12 @@ use super::path::{PathTracer, Random};
 pub(crate) enum Budget {
     /// With the first pass that ends after this time.
     Seconds(f64),
-    /// After so many samples of every pixel.
+    /// After this many samples of every pixel.
     Samples(u32),
 }
 
 impl Budget {
-    /// So many times the budget.
+    /// A multiple of the budget.
     pub(crate) fn times(self, factor: u32) -> Self {
         match self {
             Self::Seconds(seconds) => Self::Seconds(seconds * f64::from(factor)),
@@ -83,7 +83,7 @@ impl Progressive<'_> {
     }
 }
 
-/// The finalizer of `SplitMix64`: neighbouring numbers become unrelated ones.
+/// The finalizer of `SplitMix64`: neighboring numbers become unrelated ones.
 fn mix(mut bits: u64) -> u64 {
     bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -17,9 +17,9 @@ const LATTICE_SIDE: f32 = 1.5;
 /// Points of the wall are written `(y, z)`: what runs counter-clockwise in them faces the room, at +x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Window {
-    /// A square metre.
+    /// A square meter.
     Rect,
-    /// A five-pointed star of one square metre.
+    /// A five-pointed star of one square meter.
     Star,
     /// A grid of square panes half as wide as their pitch.
     Lattice,
@@ -52,7 +52,7 @@ fn square(center: Vec2, side: f32) -> Vec<Vec2> {
     [vec2(-half, -half), vec2(half, -half), vec2(half, half), vec2(-half, half)].map(|corner| center + corner).to_vec()
 }
 
-/// Ten points by turns on an outer circle and on one of 0.4 times its radius.
+/// Ten points alternately on an outer circle and on one of 0.4 times its radius.
 fn star() -> Vec<Vec2> {
     const INNER: f32 = 0.4;
     let step = PI / 5.0;

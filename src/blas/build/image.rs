@@ -86,7 +86,7 @@ const LEAVES_PER_COPY: f64 = 4.0;
 /// A budget: more keep more threads busy to the end, and hold more trees that are not packed yet.
 const BATCH_TREES: usize = 64;
 
-/// Trees of a batch may take up to about so many bytes. Unpacked they take four times as much. A budget, as
+/// Trees of a batch may take up to about this many bytes. Unpacked they take four times as much. A budget, as
 /// [`BATCH_TREES`].
 const BATCH_BYTES: f64 = (1 << 23) as f64;
 
@@ -248,10 +248,10 @@ impl<'a> ImageGroup<'a> {
                 let again: Vec<usize> = (at..trees.len())
                     .filter(|&i| self.slot(&trees[i]) == slot && !grown[i].fits(&self.pyramids[slot]))
                     .collect();
-                let Ok(anew) = parallel::map(&again, 2, |&i| {
+                let Ok(regrown) = parallel::map(&again, 2, |&i| {
                     Ok::<_, Infallible>(GrownImage::new(&self.pyramids[slot], trees[i].uv))
                 });
-                again.into_iter().zip(anew).for_each(|(i, anew)| grown[i] = anew);
+                again.into_iter().zip(regrown).for_each(|(i, tree)| grown[i] = tree);
             }
             let (root, bytes) = grown[at].tree.store(pool)?;
             let (left, grown_for) = (&mut self.pyramids[slot].memory, &grown[at].memory);

@@ -65,7 +65,7 @@ pub(super) fn class_of(places: u32) -> u32 {
     places.checked_ilog2().unwrap_or(u32::MAX)
 }
 
-/// Returns the number of places that a new mesh of so many triangles gets.
+/// Returns the number of places that a new mesh gets for its triangles.
 pub(super) fn places_of(triangles: u32) -> u32 {
     if triangles == 0 { 0 } else { triangles.next_power_of_two() }
 }
@@ -366,7 +366,7 @@ pub(super) fn check_scale(mesh: usize, scale: f32, brightest: f32) -> Result<(),
     }
 }
 
-/// `Ok` if so many of something can be numbered.
+/// `Ok` if `count` of something can be numbered.
 fn check_count(what: &'static str, count: usize) -> Result<(), Error> {
     // As spare places grow by half, at most.
     let limit = MAX_LEAVES / 2;

@@ -10,7 +10,7 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
-    /// Returns so many numbers, all in use.
+    /// Returns the numbers below `count`, all in use.
     pub(super) fn new(count: u32) -> Self {
         Self { count, free: BTreeSet::new() }
     }

@@ -178,7 +178,7 @@ fn corners([low, high]: [Vec3; 2]) -> impl Iterator<Item = Vec3> {
 /// Words of a record. *Format.*
 pub(super) const RECORD_WORDS: usize = size_of::<InstanceRecord>() / size_of::<u32>();
 
-/// Returns the first word of the first object after so many instances.
+/// Returns the first word of the first object, which follows `instances` instances.
 pub(super) fn first_object(instances: usize) -> usize {
     1 + instances * RECORD_WORDS
 }

@@ -132,7 +132,7 @@ impl LampKind for ProfileLight {
             aabb: Aabb { min: self.position, max: self.position },
             normals: if is_focused { Cone::single(self.axis) } else { Cone { axis: Vec3::Z, theta: PI } },
             emission: if is_focused { emission } else { PI },
-            // What sends in all directions and has two sides is asked for its exact intensity.
+            // What sends in all directions and has two sides reports its exact intensity.
             two_sided: !is_focused,
             mean: self.position,
             variance: 0.0,

@@ -1,7 +1,7 @@
 //! Lights that move while the shutter is open: where they are at its end, beside the records that say where they are at
 //! its start.
 //!
-//! A shading point carries its time, and [`LightsView`](super::LightsView) the same one: a light that is asked for is
+//! A shading point carries its time, and [`LightsView`](super::LightsView) the same one: a light that is requested is
 //! *made* at that time. Vertices, and the elements of transforms, are interpolated linearly in double precision; bounds
 //! in the tree hold for the whole interval. What moves is found by the number that it was added with: [`Motion`] is an
 //! array of words at the end of [`Extras`](super::Extras), so that a scene in which nothing moves has none of it, and
@@ -78,8 +78,8 @@ impl<'a> Motion<'a> {
             .map_or_else(MotionHeader::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
     }
 
-    /// Returns so many words after so many of the arrays before. Words that are not there, which validation refuses,
-    /// give none.
+    /// Returns `count` words, after `before` words of the arrays before. Words that are not there, which validation
+    /// refuses, give none.
     fn words(self, before: usize, count: usize) -> &'a [u32] {
         let start = HEADER + before;
         self.0.get(start..start + count).unwrap_or(&[])

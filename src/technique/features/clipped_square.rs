@@ -39,7 +39,7 @@ impl ClippedSquare {
         self.fan().iter().sum()
     }
 
-    /// Whether a point lies inside, or outside by no more than so much.
+    /// Whether a point lies inside, or outside by no more than a margin.
     #[cfg(test)]
     pub(super) fn holds(&self, [x, y]: [f32; 2], slack: f32) -> bool {
         let vertices = self.0.vertices();

@@ -26,7 +26,7 @@ pub(super) fn divide(items: &mut [Item], arity: Arity) -> SmallVec<[usize; MOST_
     divide_into(items, MOST_CLASSES.min(arity.lanes() / 2))
 }
 
-/// Sorts lights into at most so many classes, as [`divide`] does.
+/// Sorts lights into at most `most` classes, as [`divide`] does.
 pub(super) fn divide_into(items: &mut [Item], most: usize) -> SmallVec<[usize; MOST_CLASSES]> {
     let diagonal2 = |item: &Item| (item.high - item.low).length_squared();
     let mut classes = SmallVec::new();

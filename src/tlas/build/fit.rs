@@ -10,7 +10,7 @@ use crate::tlas::arity::{Arity, MAX_LANES};
 use crate::tlas::node::{Child, Node, Spread};
 use crate::tlas::tree::Tlas;
 
-/// A node and all nodes below it, which are neighbours in memory.
+/// A node and all nodes below it, which are neighbors in memory.
 struct Subtree<'a, const N: usize> {
     node: &'a mut Node<N>,
     spread: &'a mut Spread,

@@ -51,7 +51,7 @@ const LEAST_EDITS: u32 = 32;
 /// Larger: long batches of lights at one place take longer. Smaller: deep trees are searched in vain.
 const DEEP: usize = 32;
 
-/// Free places, relative to those in use, above which a tree is laid out anew. *Chosen* as a bound of the memory.
+/// Free places, relative to those in use, above which a tree is laid out again. *Chosen* as a bound of the memory.
 ///
 /// Larger: more memory. Smaller: edits take longer.
 const MOST_FREE: f32 = 0.5;
@@ -182,7 +182,7 @@ impl<S: LeafStore> TreeEdit<'_, S> {
         }
     }
 
-    /// Whether there were so many edits that all of the tree is to be built again. In a batch, it stays so.
+    /// Whether there were enough edits that all of the tree is to be built again. In a batch, it stays so.
     fn is_worn(&self) -> bool {
         self.state.nodes[0].edits > most_edits(self.leaf_count() as f32)
     }
@@ -224,7 +224,7 @@ impl<S: LeafStore> TreeEdit<'_, S> {
         self.tlas.leaves.len() - self.state.free_leaves.count()
     }
 
-    /// Lays out the tree anew if too many places are free.
+    /// Lays out the tree again if too many places are free.
     fn compact(&mut self) {
         let is_sparse = |free: usize, all: usize| free > FEW_FREE && free as f32 > MOST_FREE * (all - free) as f32;
         let (nodes, leaves) = (self.state.free_nodes.count(), self.state.free_leaves.count());
@@ -240,7 +240,7 @@ impl<S: LeafStore> TreeEdit<'_, S> {
     }
 }
 
-/// Returns the most edits of a subtree of so many leaves before it is built again.
+/// Returns the most edits of a subtree with `leaves` leaves before it is built again.
 fn most_edits(leaves: f32) -> u32 {
     ((REBUILT_SHARE * leaves) as u32).max(LEAST_EDITS)
 }
@@ -274,7 +274,7 @@ impl<const N: usize, S: LeafStore> WideEdit<'_, N, S> {
         (0..leaves).for_each(|leaf| self.tlas.leaves[leaf] = Slot::new::<N>(0, leaf));
     }
 
-    /// Returns the first of so many free nodes.
+    /// Returns the first of `count` free nodes.
     fn allocate_nodes(&mut self, count: usize) -> usize {
         let free = if count == 0 { Some(0) } else { self.state.free_nodes.take(count) };
         free.unwrap_or_else(|| {
@@ -291,7 +291,7 @@ impl<const N: usize, S: LeafStore> WideEdit<'_, N, S> {
         })
     }
 
-    /// Returns the first of so many free leaves.
+    /// Returns the first of `count` free leaves.
     fn allocate_leaves(&mut self, count: usize) -> usize {
         let free = if count == 0 { Some(0) } else { self.state.free_leaves.take(count) };
         free.unwrap_or_else(|| {

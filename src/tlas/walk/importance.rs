@@ -29,7 +29,7 @@ pub(crate) trait LeafOracle {
     /// Writes mean radiances, relative to the mean over all directions, of what portals show in the directions from the
     /// shading point to balls with these centers (by axis, relative to the shading point) and radii. A radiance is zero
     /// only where all of it is black. All slices are of one length. Only the elements in `set`, a set of bits, are
-    /// asked for; all are zero before.
+    /// needed; all are zero before.
     ///
     /// Must be `#[inline(always)]`: the length is then a constant, and loops over it become vectors.
     fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]);

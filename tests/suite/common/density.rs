@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::pcg::Pcg32;
 use super::scene::Scene;
 
-/// Cells are not divided further, unless a test asks for it. What is left is the difference between neighbours over
+/// Cells are not divided further, unless a test asks for it. What is left is the difference between neighbors over
 /// 4^-13 of a triangle.
 const DEEPEST: u32 = 13;
 
@@ -100,14 +100,14 @@ impl<'a> OnTriangle<'a> {
         Self { is_by_angle: on.is_constant_by_angle(), slope, ..on }
     }
 
-    /// Divides cells so often if need be, but not more than so many of them, and none where all that is in doubt is
+    /// Divides cells up to `deepest` times, but not more than `most` of them, and none where all that is in doubt is
     /// `enough`. What is left undivided is looked at in random places, and what [`Self::integrate`] says of it is a
     /// standard error.
     pub(crate) fn limits(self, deepest: u32, most: usize, enough: f64) -> Self {
         Self { deepest, most, enough, ..self }
     }
 
-    /// Leaves cells undivided that are so many times as probable, or so many times as much in doubt, whichever way the
+    /// Leaves cells undivided that are `factor` times as probable, or as much in doubt, whichever way the
     /// density is constant.
     pub(crate) fn coarser(self, factor: f64) -> Self {
         Self { coarser: factor, ..self }

@@ -55,7 +55,7 @@ impl Image {
         texture.filter(self.filter).wrap(self.wrap[0], self.wrap[1])
     }
 
-    /// One of noise, half black, one bright texel on black or on grey; every filter and wrap.
+    /// One of noise, half black, one bright texel on black or on gray; every filter and wrap.
     pub(crate) fn random(pcg: &mut Pcg32, kind: usize) -> Self {
         let size = [1 + pcg.below(8), 2 + pcg.below(7)];
         let bright = pcg.below(size[0] * size[1]);

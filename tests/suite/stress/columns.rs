@@ -80,10 +80,10 @@ pub(crate) fn with_lobe(x: ShadingPoint, turn: usize) -> ShadingPoint {
     guide.at_time(x.time())
 }
 
-/// A normal over whose horizon a tip rises, but not the centre.
-fn grazing(tip: DVec3, centre: DVec3) -> DVec3 {
+/// A normal over whose horizon a tip rises, but not the center.
+fn grazing(tip: DVec3, center: DVec3) -> DVec3 {
     let tip = tip.normalize();
-    let away = (centre - tip * tip.dot(centre)).normalize();
+    let away = (center - tip * tip.dot(center)).normalize();
     (GRAZING * tip - away).normalize()
 }
 

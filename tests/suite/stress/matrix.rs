@@ -12,14 +12,14 @@ use crate::common::lights::{ARITIES, Point, build};
 use crate::common::parallel;
 
 /// Bars of the errors.
-const NORMALISATION: f64 = 1e-4;
+const NORMALIZATION: f64 = 1e-4;
 const AGREEMENT: f64 = 1e-5;
 const IRRADIANCE: f64 = 1e-3;
 
 /// Every arity, with lights of one and of two sides.
 const VARIANTS: usize = 2 * ARITIES.len();
 const RECEIVERS: usize = 3;
-/// A combination that misses a bar is done again with so many times the samples and cells.
+/// A combination that misses a bar is done again with this many times the samples and cells.
 const AGAIN: usize = 16;
 
 /// The worst of all receivers and variants.
@@ -39,11 +39,11 @@ struct Plan {
     whole: Effort,
     /// Of all other variants: samples and directions alone.
     others: Option<Effort>,
-    /// One receiver a cell, by turns.
+    /// One receiver a cell, in rotation.
     thin: bool,
     /// Whether the receivers have lobes.
     lobes: bool,
-    /// One row of so many.
+    /// One row in this many.
     step: usize,
 }
 
@@ -94,11 +94,11 @@ impl Found {
     /// What is above its bar by more than chance.
     fn misses(&self) -> Vec<&'static str> {
         let allowed = |bar: f64, resolution: f64| bar.max(self.rounding) + resolution;
-        let normalisation = !self.beyond && self.normalisation > allowed(NORMALISATION, self.normalisation_resolution);
+        let normalization = !self.beyond && self.normalization > allowed(NORMALIZATION, self.normalization_resolution);
         let agreement = self.agreement > AGREEMENT;
         let is_off = |[error, resolution]: [f64; 2]| error > allowed(IRRADIANCE, resolution);
         let irradiance = !self.beyond && self.irradiance.is_some_and(is_off);
-        let all = [(normalisation, "normalisation"), (agreement, "agreement"), (irradiance, "irradiance")];
+        let all = [(normalization, "normalization"), (agreement, "agreement"), (irradiance, "irradiance")];
         all.into_iter().filter(|(misses, _)| *misses).map(|(_, name)| name).collect()
     }
 }
@@ -164,9 +164,9 @@ fn print_all(table: &[(&'static str, Vec<Cell>)]) {
             return "dark".into();
         }
         let none = worst(cell, |found| if found.dark { 0.0 } else { found.none });
-        let unresolved = worst(cell, |found| found.normalisation_resolution);
-        let mut entry = short(worst(cell, |found| found.normalisation));
-        if unresolved > NORMALISATION {
+        let unresolved = worst(cell, |found| found.normalization_resolution);
+        let mut entry = short(worst(cell, |found| found.normalization));
+        if unresolved > NORMALIZATION {
             write!(entry, " ± {}", short(unresolved)).expect("a string can grow");
         }
         entry.push_str(mark(cell));
@@ -278,5 +278,5 @@ fn a_wrong_density_misses_all_bars() {
     let effort = Effort { points: 1024, samples: 300, directions: 100, cells: 300 };
     assert!(measure((&row, &lights), &lights.at(&x), [&x, &x], effort, 1).misses().is_empty());
     let found = measure((&row, &lights), &Wrong(lights.at(&x)), [&x, &x], effort, 1);
-    assert_eq!(found.misses(), ["normalisation", "agreement", "irradiance"], "{found:?}");
+    assert_eq!(found.misses(), ["normalization", "agreement", "irradiance"], "{found:?}");
 }

@@ -41,9 +41,9 @@ pub(crate) struct Effort {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Found {
     /// Of the sum of all integrals and the rate of `None` against one.
-    pub(crate) normalisation: f64,
+    pub(crate) normalization: f64,
     /// What the rate of `None` and the integration do not tell.
-    pub(crate) normalisation_resolution: f64,
+    pub(crate) normalization_resolution: f64,
     pub(crate) agreement: f64,
     /// Of the mean estimate and [`LIMIT`] standard errors of it, if there is enough light.
     pub(crate) irradiance: Option<[f64; 2]>,
@@ -101,10 +101,10 @@ pub(crate) fn measure(
     } else {
         (integral, unresolved)
     };
-    found.normalisation = (integral + found.none - 1.0).abs();
+    found.normalization = (integral + found.none - 1.0).abs();
     // Of a rate without an exception among n, an exception in 12 / n would be too likely to miss.
     let unseen = if found.none > 0.0 { 12.0 / estimate.samples as f64 } else { 0.0 };
-    found.normalisation_resolution = unresolved + (LIMIT * estimate.none[1]).max(unseen);
+    found.normalization_resolution = unresolved + (LIMIT * estimate.none[1]).max(unseen);
     if found.none == 1.0 {
         assert!(integral == 0.0 || !found.dark, "{}: a density of {integral} without samples at {x:?}", row.name);
     }

@@ -12,7 +12,7 @@ use crate::common::scene::{Image, LightMesh, Paint, Scene, Sky};
 pub(crate) struct Row {
     pub(crate) name: &'static str,
     pub(crate) scene: Scene,
-    /// Whether the lights are taken for ones of unit radiance, as two look-ups of such a texture need not agree.
+    /// Whether the lights are taken for ones of unit radiance, as two lookups of such a texture need not agree.
     pub(crate) ones: bool,
     /// Angle, in radians, that the smallest bright part of an environment is seen under.
     pub(crate) detail: f64,
@@ -142,7 +142,7 @@ fn one_center(pcg: &mut Pcg32, count: usize, size: f32) -> Scene {
         mesh.positions.extend([corner(0), corner(1), corner(2)]);
         mesh.indices.push([3 * i, 3 * i + 1, 3 * i + 2]);
     }
-    Scene::new("one centre", vec![mesh])
+    Scene::new("one center", vec![mesh])
 }
 
 /// A cube that shines inwards.
@@ -197,7 +197,7 @@ fn turned(mut scene: Scene, local: Vec3) -> Scene {
     scene
 }
 
-/// Centre of a texel of a latitude-longitude image, some of the texel's width aside.
+/// Center of a texel of a latitude-longitude image, some of the texel's width aside.
 fn place([width, height]: [usize; 2], [column, row]: [usize; 2], aside: f32) -> Vec3 {
     let phi = 2.0 * PI * (column as f32 + 0.5 + aside) / width as f32;
     let theta = PI * (row as f32 + 0.5 + aside) / height as f32;

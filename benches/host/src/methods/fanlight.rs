@@ -30,7 +30,7 @@ pub(super) struct Fanlight {
     starts: Vec<u32>,
     /// Whether the sky is a light itself, as no portal leads to it.
     open_sky: bool,
-    /// Whether glossy surfaces are handed over as such.
+    /// Whether glossy surfaces are passed as such.
     tells_lobes: bool,
     /// How much a call may do at the first vertex of a path, and at later ones.
     efforts: [Effort; 2],

@@ -6,7 +6,7 @@ use crate::scenes::Scene;
 /// Places along a cell's edge that its average is taken of, less one.
 const STEPS: u8 = 3;
 
-/// Share of its neighbourhood's maximum that a cell keeps in which nothing was found.
+/// Share of its neighborhood's maximum that a cell keeps in which nothing was found.
 const LEAST: f64 = 1e-3;
 
 /// Level by level; the root first.

@@ -4,7 +4,7 @@ use core::f32::consts::PI;
 
 use glam::Vec3;
 
-/// A cell after so many cuts.
+/// A cell after a number of cuts.
 #[derive(Clone, Copy)]
 pub(super) struct Cell {
     /// Relative to the shading point.

@@ -1,7 +1,7 @@
 //! The published method for portals (Ogaki 2020, "Generalized Light Portals"), kept as it was presented, whatever
 //! becomes of the crate: a wide tree over triangles by the conservative term of Conty Estevez and Kulla, below it a
 //! tree of arity 4 over the barycentric domain by the extremely conservative term, and in both the environment by a
-//! single look-up of a 3x3-filtered level. The descent ends where a triangle covers a single pixel of the environment,
+//! single lookup of a 3x3-filtered level. The descent ends where a triangle covers a single pixel of the environment,
 //! or one that is constant.
 
 mod averages;
@@ -27,7 +27,7 @@ use pyramid::Pyramid;
 const MAX_DEPTH: u32 = 24;
 
 /// Share of the choices in a triangle that the texture alone decides on. It is no part of the talk, and in its favour:
-/// a bright pixel that the look-up misses costs a hundredth of the variance that it does without.
+/// a bright pixel that the lookup misses costs a hundredth of the variance that it does without.
 const DEFENSIVE: f32 = 0.02;
 
 pub(crate) struct Talk<'a> {

@@ -8,7 +8,7 @@ use crate::render::{Budget, PathTracer, Progressive, Random, Techniques, World};
 
 /// Files that are made from each good one.
 const MUTANTS: u32 = 1500;
-/// Every so many of them are rendered if they can be.
+/// One in this many of them is rendered if it can be.
 const RENDERED: u32 = 8;
 
 #[test]

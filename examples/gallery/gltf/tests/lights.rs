@@ -37,7 +37,7 @@ fn expected(irradiance: impl Fn(Vec3) -> f64) -> f64 {
             sum += irradiance(Vec3::new(0.0, 2.0, 0.0) - point.position);
         }
     }
-    // Three channels, of a floor that reflects so much.
+    // Three channels, of a floor that reflects this share.
     sum / f64::from(64 * 256) * 3.0 * 0.8 / core::f64::consts::PI
 }
 
