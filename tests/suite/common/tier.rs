@@ -49,8 +49,8 @@ const FULL: Tier = Tier {
 };
 
 const THIN: Tier = Tier {
-    scenes: 200,
-    agreement_divisor: 50,
+    scenes: 100,
+    agreement_divisor: 25,
     agreement_least: 0,
     points: 8,
     cases: 50,
