@@ -5,8 +5,8 @@
 //!
 //! AVX-512 needs a compiler that knows it: `build.rs` sets `fanlight_avx512` where it does.
 
-/// Code that is compiled once for each instruction set. The functions are methods here, as a compiler then works on the
-/// kernels of different modules at the same time.
+/// Code that is compiled once for each instruction set, by a method each: a compiler places methods in the module of
+/// their type, and works on several modules at the same time.
 pub(crate) trait Kernel: Sized {
     /// Result of the code.
     type Output;

@@ -100,8 +100,8 @@ impl Results {
             "below" => of == Class::Below,
             _ => true,
         };
-        let relvar = metrics::summarise(&self.measured, wanted);
-        let selection = metrics::summarise_selection(&self.selections, wanted);
+        let relvar = metrics::summarize(&self.measured, wanted);
+        let selection = metrics::summarize_selection(&self.selections, wanted);
         if relvar.is_none() && selection.is_none() {
             return None;
         }

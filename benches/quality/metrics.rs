@@ -58,7 +58,7 @@ pub(crate) fn summary(variances: impl Iterator<Item = (f64, f64)>) -> Option<Sum
 }
 
 /// Summary of measurements, their mean rate of zeros, and the largest share that is lost.
-pub(crate) fn summarise(points: &[Measured], wanted: impl Fn(Class) -> bool) -> Option<(Summary, f64, f64)> {
+pub(crate) fn summarize(points: &[Measured], wanted: impl Fn(Class) -> bool) -> Option<(Summary, f64, f64)> {
     let points: Vec<&Measured> = points.iter().filter(|point| wanted(point.class)).collect();
     let zeros = points.iter().map(|point| point.zeros).sum::<f64>() / points.len() as f64;
     let lost = points.iter().fold(0.0, |most: f64, point| most.max(point.lost));
@@ -66,7 +66,7 @@ pub(crate) fn summarise(points: &[Measured], wanted: impl Fn(Class) -> bool) -> 
 }
 
 /// Summary of selections, and the largest share that is lost.
-pub(crate) fn summarise_selection(points: &[Selection], wanted: impl Fn(Class) -> bool) -> Option<(Summary, f64)> {
+pub(crate) fn summarize_selection(points: &[Selection], wanted: impl Fn(Class) -> bool) -> Option<(Summary, f64)> {
     let points: Vec<&Selection> = points.iter().filter(|point| wanted(point.class)).collect();
     let lost = points.iter().fold(0.0, |most: f64, point| most.max(point.lost));
     summary(points.iter().map(|point| (point.variance, point.e2))).map(|summary| (summary, lost))

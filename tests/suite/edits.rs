@@ -96,7 +96,7 @@ fn random_edits_leave_the_lights_of_a_fresh_build() {
     }
 }
 
-/// A world after 400 edits in batches of a size, and its sampler.
+/// A world after 400 edits in batches of `batch`, and its sampler.
 pub(crate) fn edited(seed: u64, kind: usize, batch: usize) -> (World, LightSampler) {
     let mut pcg = Pcg32::new(seed, 74);
     let mut world = World::random(&mut pcg, kind, 60);

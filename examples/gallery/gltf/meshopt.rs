@@ -21,7 +21,7 @@ const PADDING: usize = 4;
 /// Largest element in bytes. *Format.*
 const LARGEST: usize = 256;
 
-/// Unpacks a number of elements of the given size in bytes.
+/// Unpacks `count` elements of `stride` bytes.
 pub(super) fn decode(source: &[u8], count: usize, stride: usize, mode: &str, filter: &str) -> Result<Vec<u8>, Error> {
     let mut bytes = match mode {
         "ATTRIBUTES" => attributes(source, count, stride)?,
@@ -58,7 +58,7 @@ impl<'a> Cursor<'a> {
         Ok(self.take(1)?[0])
     }
 
-    /// Refuses data that is longer or shorter than it should be, up to its tail.
+    /// Refuses data of which more or less than `rest` bytes are left.
     fn ends_before(&self, rest: usize) -> Result<(), Error> {
         if self.at + rest == self.bytes.len() { Ok(()) } else { Err("its data is of another length".into()) }
     }

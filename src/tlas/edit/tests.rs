@@ -136,7 +136,7 @@ fn an_edited_tree_is_the_fit_of_its_shape() {
     }
 }
 
-/// Adds equal lights, in batches of a size, and checks the tree.
+/// Adds equal lights, in batches of `batch`, and checks the tree.
 fn add_equal(batch: u32) {
     let (mut tlas, mut state, mut store) = (Tlas::empty(Arity::Four), TreeState::default(), Store::default());
     let mut pcg = Pcg32::new(9, 73);

@@ -289,7 +289,7 @@ impl<const N: usize> Node<N> {
             let center = Vec3::new(f32::from(centers[0][i]), f32::from(centers[1][i]), f32::from(centers[2][i]));
             let center = origin + center * step;
 
-            // The horizon, by the most and the least favourable corner of the box.
+            // The horizon, by the most and the least favorable corner of the box.
             let (height, reach) = (horizon.dot(center) + x.lift, absolute_horizon.dot(half));
             // The emitters' side: the angle between the axis and the direction to any point of the box, by the box's
             // nearest corner along the axis and the ball around it across.

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 
 use super::scene::{Image, LightMesh, Paint, Scene, Sky};
 
-/// The generalised golden ratio in two dimensions: multiples of its inverse powers fill the square evenly.
+/// The generalized golden ratio in two dimensions: multiples of its inverse powers fill the square evenly.
 const GOLDEN: f64 = 1.324_717_957_244_746;
 
 /// Weight of a unit direction: the cosine, and what a lobe makes of it.

@@ -80,13 +80,14 @@ pub(crate) fn agreement(points: usize, full: usize) -> usize {
     (full / tier().agreement_divisor).max(tier().agreement_least.div_ceil(points))
 }
 
-/// Numbers below `count`: all of them, or one of each [`Tier::stride`].
+/// Numbers below `count`: all of them, or one in [`Tier::stride`].
 pub(crate) fn some(count: usize) -> Vec<usize> {
     (0..count).step_by(tier().stride).collect()
 }
 
 /// As [`some`], where each takes seconds: two of five in the full tier, and one of 13 in the thin one. Five and 13 have no
-/// factor in common with the periods of the families either.
+/// factor in common with the periods of the families either; of 7 or 11, none of normalization's points would miss some
+/// samples and not others.
 pub(crate) fn some_slow(count: usize) -> Vec<usize> {
     let (period, kept): (usize, &[usize]) = if tier().stride > 1 { (13, &[0]) } else { (5, &[0, 2]) };
     (0..count).filter(|i| kept.contains(&(i % period))).collect()

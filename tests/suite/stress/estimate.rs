@@ -12,12 +12,12 @@ use crate::common::pcg::Pcg32;
 
 /// Independent sets of points, whose spread tells the error of their mean.
 const SETS: usize = 32;
-/// Standard errors of a mean of sets, by their number, that chance exceeds once in 200,000 times (Student's t).
+/// Standard errors of a mean of [`SETS`] sets that chance exceeds once in 200,000 times (Student's t).
 pub(crate) const LIMIT: f64 = 5.5;
 /// Resolution that is good enough to stop.
 const RESOLVED: f64 = 2e-4;
 
-/// Even points of the unit cube: multiples of the inverse powers of the generalised golden ratio.
+/// Even points of the unit cube: multiples of the inverse powers of the generalized golden ratio.
 struct Even {
     start: [f64; 3],
 }
