@@ -11,6 +11,10 @@ pub(crate) trait Kernel: Sized {
     /// Result of the code.
     type Output;
 
+    /// Whether 512-bit vectors make it faster: measured (docs/SPEED.md, "Instruction sets"). Other code runs with 256
+    /// bits, and is not compiled for more.
+    const USES_512_BITS: bool = false;
+
     /// Runs the code. Must be `#[inline(always)]`, and so must everything in it that is to be compiled for wider
     /// vectors.
     fn run(self) -> Self::Output;
@@ -108,7 +112,10 @@ impl InstructionSet {
             VectorExtension::Avx2 => unsafe { kernel.run_avx2() },
             // SAFETY: as before.
             #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
-            VectorExtension::Avx512 => unsafe { kernel.run_avx512() },
+            VectorExtension::Avx512 if K::USES_512_BITS => unsafe { kernel.run_avx512() },
+            // SAFETY: machines with AVX-512 have AVX2.
+            #[cfg(all(target_arch = "x86_64", feature = "std", fanlight_avx512))]
+            VectorExtension::Avx512 => unsafe { kernel.run_avx2() },
         }
     }
 }

@@ -90,6 +90,7 @@ pub(in crate::tlas) struct SampleWalk<'a, const N: usize, S, L> {
 
 impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for SampleWalk<'_, N, S, L> {
     type Output = Option<(u32, f64)>;
+    const USES_512_BITS: bool = N >= 16;
 
     #[inline(always)]
     fn run(mut self) -> Self::Output {
@@ -109,6 +110,7 @@ struct InterleavedWalks<'a, const N: usize, S, L> {
 
 impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for InterleavedWalks<'_, N, S, L> {
     type Output = ();
+    const USES_512_BITS: bool = N >= 16;
 
     #[inline(always)]
     fn run(self) {
@@ -142,6 +144,7 @@ pub(in crate::tlas) struct PmfWalk<'a, const N: usize, S, L> {
 
 impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for PmfWalk<'_, N, S, L> {
     type Output = f64;
+    const USES_512_BITS: bool = N >= 16;
 
     #[inline(always)]
     fn run(self) -> f64 {
@@ -170,6 +173,7 @@ pub(super) struct NodeWeights<'a, const N: usize, S, L> {
 
 impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for NodeWeights<'_, N, S, L> {
     type Output = [f32; N];
+    const USES_512_BITS: bool = N >= 16;
 
     #[inline(always)]
     fn run(self) -> [f32; N] {

@@ -62,6 +62,7 @@ pub(super) struct KeepingWalk<'a, const N: usize, S, L> {
 
 impl<const N: usize, S: LeafOracle, L: Lobe> Kernel for KeepingWalk<'_, N, S, L> {
     type Output = Option<(u32, f64)>;
+    const USES_512_BITS: bool = N >= 16;
 
     #[inline(always)]
     fn run(self) -> Self::Output {

@@ -78,6 +78,7 @@ pub(in crate::tlas) struct Crossed<'a, const N: usize, const WIDENED: bool> {
 
 impl<const N: usize, const WIDENED: bool> Kernel for Crossed<'_, N, WIDENED> {
     type Output = u32;
+    const USES_512_BITS: bool = N >= 16;
 
     /// Slab test. A ray in the plane of a slab gives NaN there, which the comparisons pass over.
     #[inline(always)]
@@ -112,6 +113,7 @@ pub(in crate::tlas) struct Met<'a, const N: usize, const WIDENED: bool> {
 
 impl<const N: usize, const WIDENED: bool> Kernel for Met<'_, N, WIDENED> {
     type Output = u32;
+    const USES_512_BITS: bool = N >= 16;
 
     /// By the distance of a ball's center from the cone's surface, negative inside, against its radius.
     #[inline(always)]

@@ -81,6 +81,7 @@ struct LaneSets<'a, const N: usize, L> {
 
 impl<const N: usize, L: Lobe> Kernel for LaneSets<'_, N, L> {
     type Output = [u32; 3];
+    const USES_512_BITS: bool = N >= 16;
 
     #[inline(always)]
     fn run(self) -> [u32; 3] {
