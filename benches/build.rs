@@ -1,16 +1,19 @@
 //! Times of building and of refitting `cloud-N`: `N` small triangles at random in the unit cube, each a mesh with a
-//! radiance of its own; and of building a million instances of one lamp.
+//! radiance of its own; of adding and building a million points at random; and of building a million instances of one
+//! lamp.
 //!
 //! With the feature `rayon` everything is timed on one thread and on all.
 
 use core::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion};
-use fanlight::{Instance, LightSampler, LightSamplerBuilder, Mesh, MeshId, MeshUpdate, Weight};
+use fanlight::{Instance, LightSampler, LightSamplerBuilder, Mesh, MeshId, MeshUpdate, PointLight, Weight};
 use glam::{Affine3A, Vec3};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
 
+/// Points without an extent.
+const POINTS: usize = 1_000_000;
 /// Instances of a lamp.
 const INSTANCES: usize = 1_000_000;
 
@@ -58,6 +61,21 @@ fn refit(lights: &mut LightSampler, updates: &[MeshUpdate<'_>]) {
     lights.refit(black_box(updates)).expect("the changes are valid");
 }
 
+/// Points at random in the unit cube, with intensities of their own.
+fn points() -> Vec<PointLight> {
+    let mut pcg = Pcg32::new(3, 1);
+    let mut point = || PointLight::new(vector(&mut pcg), (6.0 * uniform(&mut pcg) - 3.0).exp2());
+    (0..POINTS).map(|_| point()).collect()
+}
+
+fn builder_of_points(points: &[PointLight]) -> LightSamplerBuilder<'static> {
+    let mut builder = LightSampler::builder();
+    for point in points {
+        builder.add_light(*point).expect("the point is finite");
+    }
+    builder
+}
+
 /// A street lamp of a thousand triangles, a million times.
 fn street() -> LightSamplerBuilder<'static> {
     let mut pcg = Pcg32::new(2, 1);
@@ -89,6 +107,15 @@ fn rows(criterion: &mut Criterion, name: &str, threads: usize) {
             pool.install(|| b.iter(|| refit(&mut lights, &updates)));
         });
     }
+    let points = points();
+    group.bench_function(BenchmarkId::new("add points", POINTS), |b| {
+        pool.install(|| b.iter_with_large_drop(|| builder_of_points(&points)));
+    });
+    group.bench_function(BenchmarkId::new("points", POINTS), |b| {
+        pool.install(|| b.iter_batched(|| builder_of_points(&points), build, BatchSize::PerIteration));
+    });
+    let bytes = build(builder_of_points(&points)).bytes();
+    println!("{POINTS} points take {} bytes, {} of them for the tree", bytes.total(), bytes.light_tree);
     group.bench_function(BenchmarkId::new("instances", INSTANCES), |b| {
         pool.install(|| b.iter_batched(street, build, BatchSize::PerIteration));
     });
