@@ -234,6 +234,34 @@ macro_rules! of_lamp {
     };
 }
 
+/// Evaluates an expression with whichever kind of lamp a record is of, and another one where there is no such kind.
+/// Nothing but this kind is made of the record, so that little is left of a question about one of its numbers.
+macro_rules! of_record {
+    ($record:expr, $kind:ident => $call:expr, else $otherwise:expr) => {
+        match $record.kind {
+            SphereLight::CODE => of_record!(SphereLight, $record, $kind => $call),
+            PointLight::CODE => of_record!(PointLight, $record, $kind => $call),
+            SpotLight::CODE => of_record!(SpotLight, $record, $kind => $call),
+            DiskLight::CODE => of_record!(DiskLight, $record, $kind => $call),
+            TubeLight::CODE => of_record!(TubeLight, $record, $kind => $call),
+            DistantLight::CODE => of_record!(DistantLight, $record, $kind => $call),
+            ProfileLight::CODE => of_record!(ProfileLight, $record, $kind => $call),
+            _ => $otherwise,
+        }
+    };
+    ($type:ident, $record:expr, $kind:ident => $call:expr) => {{
+        let $kind = $type::from_values($record.values);
+        $call
+    }};
+    // Records are checked before anything is asked of them.
+    ($record:expr, $kind:ident => $call:expr) => {
+        of_record!($record, $kind => $call, else {
+            let $kind = SphereLight::new(Vec3::ZERO, 0.0, 0.0);
+            $call
+        })
+    };
+}
+
 /// Evaluates an expression with the view of whichever kind a lamp is.
 macro_rules! of_view {
     ($view:expr, $kind:ident => $call:expr) => {
@@ -276,21 +304,7 @@ fn code_of<K: LampKind>(_: &K) -> u32 {
 impl LampRecord {
     /// Returns the lamp; `None` if there is no kind of this code.
     fn decode(&self) -> Option<Lamp> {
-        Some(match self.kind {
-            SphereLight::CODE => Lamp::Sphere(SphereLight::from_values(self.values)),
-            PointLight::CODE => Lamp::Point(PointLight::from_values(self.values)),
-            SpotLight::CODE => Lamp::Spot(SpotLight::from_values(self.values)),
-            DiskLight::CODE => Lamp::Disk(DiskLight::from_values(self.values)),
-            TubeLight::CODE => Lamp::Tube(TubeLight::from_values(self.values)),
-            DistantLight::CODE => Lamp::Distant(DistantLight::from_values(self.values)),
-            ProfileLight::CODE => Lamp::Profile(ProfileLight::from_values(self.values)),
-            _ => return None,
-        })
-    }
-
-    /// Returns the lamp. Records are checked before anything is asked of them.
-    fn lamp(&self) -> Lamp {
-        self.decode().unwrap_or(Lamp::Sphere(SphereLight::new(Vec3::ZERO, 0.0, 0.0)))
+        of_record!(self, kind => Some(kind.into()), else None)
     }
 
     /// Returns the lamp's number among all that were added.
@@ -310,15 +324,12 @@ impl LampRecord {
 
     /// Returns the light as one that is infinitely far away; `None` for any other.
     pub(super) fn distant(&self) -> Option<DistantLight> {
-        match self.lamp() {
-            Lamp::Distant(light) => Some(light),
-            _ => None,
-        }
+        (self.kind == DistantLight::CODE).then(|| DistantLight::from_values(self.values))
     }
 
     /// Whether the lamp has an extent.
     pub(super) fn has_extent(&self) -> bool {
-        of_lamp!(self.lamp(), kind => kind.has_extent())
+        of_record!(self, kind => kind.has_extent())
     }
 
     /// Returns what a host gets to know of a sample of this lamp.
@@ -328,16 +339,14 @@ impl LampRecord {
     }
 
     /// Returns radiance or radiant intensity.
+    #[inline]
     pub(super) fn weight(&self) -> f32 {
-        of_lamp!(self.lamp(), kind => kind.weight())
+        of_record!(self, kind => kind.weight())
     }
 
     /// Returns the number of the lamp's profile; `None` for a lamp without one.
     pub(super) fn profile(&self) -> Option<u32> {
-        match self.lamp() {
-            Lamp::Profile(light) => Some(light.profile().index()),
-            _ => None,
-        }
+        (self.kind == ProfileLight::CODE).then(|| ProfileLight::from_values(self.values).profile().index())
     }
 }
 
@@ -351,34 +360,38 @@ pub(crate) struct LampLight<'a> {
 impl LampLight<'_> {
     /// Draws a ray in which light leaves.
     pub(super) fn emit(&self, point: [Variate; 2], direction: [Variate; 2], side: f64) -> EmittedRay {
-        of_lamp!(self.record.lamp(), kind => kind.emit(point, direction, side, self.extras.profiles()))
+        of_record!(self.record, kind => kind.emit(point, direction, side, self.extras.profiles()))
     }
 
     /// Returns the density with which [`Self::emit`] draws a ray in a unit direction.
     pub(super) fn emission_pdf(&self, direction: Vec3) -> f64 {
-        of_lamp!(self.record.lamp(), kind => kind.emission_pdf(direction, self.extras.profiles()))
+        of_record!(self.record, kind => kind.emission_pdf(direction, self.extras.profiles()))
     }
 }
 
 impl LightKind for LampLight<'_> {
+    #[inline]
     fn is_portal(&self) -> bool {
         false
     }
 
     fn is_two_sided(&self) -> bool {
-        of_lamp!(self.record.lamp(), kind => kind.reach(self.extras.profiles()).two_sided)
+        of_record!(self.record, kind => kind.reach(self.extras.profiles()).two_sided)
     }
 
+    #[inline]
     fn weight(&self) -> f32 {
         self.record.weight()
     }
 
+    #[inline]
     fn area(&self) -> f32 {
-        of_lamp!(self.record.lamp(), kind => kind.area(self.extras.profiles()))
+        of_record!(self.record, kind => kind.area(self.extras.profiles()))
     }
 
     fn bounds(&self, _directional: bool, energy: impl FnOnce(f32) -> f32) -> (LightBounds, Moments) {
-        let (Reach { aabb, normals, emission, two_sided, mean, variance, normal }, area) = of_lamp!(self.record.lamp(), kind => (kind.reach(self.extras.profiles()), kind.area(self.extras.profiles())));
+        let (Reach { aabb, normals, emission, two_sided, mean, variance, normal }, area) =
+            of_record!(self.record, kind => (kind.reach(self.extras.profiles()), kind.area(self.extras.profiles())));
         let energy = energy(area);
         let bounds = LightBounds { aabb, normals, emission, flux: energy, portal: 0.0, two_sided };
         (bounds, Moments { energy, mean, variance, normal })
@@ -397,7 +410,7 @@ impl LightKind for LampLight<'_> {
     #[inline(never)]
     fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<LocalPoint> {
         let unit = direction.as_dvec3().try_normalize()?;
-        let is_crossed = of_lamp!(self.record.lamp(), kind => kind.is_crossed(origin, unit));
+        let is_crossed = of_record!(self.record, kind => kind.is_crossed(origin, unit));
         // A sample's own direction stays as it is: next to a rim, another rounding would have another density.
         let is_unit = (direction.as_dvec3().length_squared() - 1.0).abs() <= UNIT_ROUNDING;
         is_crossed.then(|| LocalPoint::from_direction(if is_unit { direction } else { unit.as_vec3() }))
@@ -412,7 +425,7 @@ impl LampView {
         if !x.position.to_array().iter().all(|x| x.abs() <= FARTHEST_POINT) {
             return None;
         }
-        let shape = of_lamp!(lamp.record.lamp(), kind => kind.view(x, lamp.extras.profiles()))?;
+        let shape = of_record!(lamp.record, kind => kind.view(x, lamp.extras.profiles()))?;
         let is_below = x.receiver.has_horizon() && {
             let [height, size] = of_view!(&shape, view => view.highest(x.receiver.normal().as_dvec3()));
             height < f64::from(-HORIZON_ROUNDING) * size
