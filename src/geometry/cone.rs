@@ -50,7 +50,10 @@ impl Cone {
 
 /// Angle between unit vectors, accurate for small and for nearly straight ones as well.
 pub(crate) fn angle(a: Vec3, b: Vec3) -> f32 {
-    if a.dot(b) >= 0.0 {
+    if a == b {
+        // As what follows would find, and so it is for all lamps that send in all directions.
+        0.0
+    } else if a.dot(b) >= 0.0 {
         2.0 * math::asin(0.5 * math::sqrt((a - b).length_squared()))
     } else {
         PI - 2.0 * math::asin(0.5 * math::sqrt((a + b).length_squared()))
