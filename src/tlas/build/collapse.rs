@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::binary::BinaryNode;
-use super::forest::{LaneCut, forests};
+use super::forest::{LaneCut, divisions};
 use crate::tlas::arity::Arity;
 use crate::tlas::node::{Node, Slot, Spread, words};
 use crate::tlas::tree::Tlas;
@@ -19,12 +19,12 @@ pub(super) fn collapse<const N: usize>(arity: Arity, binary: &[BinaryNode]) -> (
         lights.push(leaf.link);
         return (tlas, lights);
     }
-    let forests = forests::<N>(binary);
+    let divisions = divisions::<N>(binary);
     push::<N>(&mut tlas, Slot::ROOT);
     // Wide nodes that wait for their children, each with its binary node.
     let mut pending = Vec::from([(0, 0)]);
     while let Some((index, root)) = pending.pop() {
-        let cut = LaneCut::new(binary, &forests, root);
+        let cut = LaneCut::new(binary, &divisions, root);
         let members = || cut.members().iter().copied();
         let nodes = members().filter(|&below| binary[below].count > 1);
         let leaves = members().filter(|&below| binary[below].count == 1);

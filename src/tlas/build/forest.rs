@@ -5,32 +5,35 @@
 //! root of its cost in the surface area orientation heuristic, plus the same for every node, so that few nodes are
 //! needed and their lanes are full. Classes of sizes have equal shares of the root's lanes.
 
+use alloc::vec;
 use alloc::vec::Vec;
-use core::ops::Range;
 
 use smallvec::SmallVec;
 
 use super::binary::{BinaryNode, JOINED};
 use super::classes::MOST_CLASSES;
 use crate::math;
+use crate::parallel;
 
 /// Cost of a wide node, relative to the mean cost of all clusters that fit into one. A larger cost gives fewer and
 /// fuller nodes, a smaller one nodes that mislead less. *Measured* (docs/SPEED.md, "Fewer and fuller nodes").
 const NODE_COST: f32 = 4.0;
 
-/// How to divide one binary node into at most 1, 2 ... `N` lanes.
+/// How to divide one binary node into at most 1, 2 ... `N` lanes: by each number less one, the number of lanes for the
+/// left child; zero where the node had better stay a single lane.
+pub(super) type Division<const N: usize> = [u8; N];
+
+/// The cheapest ways to divide one binary node.
 #[derive(Clone, Copy)]
-pub(super) struct Forest<const N: usize> {
+struct Forest<const N: usize> {
     /// Least cost, by the number of lanes less one.
     cost: [f32; N],
-    /// Number of lanes for the left child; zero where the node had better stay a single lane.
-    left: [u8; N],
+    left: Division<N>,
 }
 
 /// Finds the cheapest way to divide each node of a binary tree.
-pub(super) fn forests<const N: usize>(binary: &[BinaryNode]) -> Vec<Forest<N>> {
-    let mut forests = Vec::new();
-    forests.resize(binary.len(), Forest { cost: [0.0; N], left: [0; N] });
+pub(super) fn divisions<const N: usize>(binary: &[BinaryNode]) -> Vec<Division<N>> {
+    let mut divisions = vec![[0; N]; binary.len()];
     // 1. Where the classes of sizes begin: each node that joins them has one on its left, and all others on its right.
     let mut joins = SmallVec::<[usize; MOST_CLASSES]>::new();
     let mut last = 0;
@@ -39,42 +42,69 @@ pub(super) fn forests<const N: usize>(binary: &[BinaryNode]) -> Vec<Forest<N>> {
         last += binary[last].link as usize;
     }
     // 2. Every class by itself: what the clusters of one cost says nothing about those of another.
-    divide(binary, &mut forests, last..binary.len());
-    for &join in &joins {
-        divide(binary, &mut forests, join + 1..join + binary[join].link as usize);
-    }
+    let mut below = divide_class(&binary[last..], &mut divisions[last..]);
     // 3. The joins, the last of which has two classes below it.
     for (classes, &join) in (2..).zip(joins.iter().rev()) {
         let (left, right) = (join + 1, join + binary[join].link as usize);
+        let class = divide_class(&binary[left..right], &mut divisions[left..right]);
         let most = [left, right].map(|child| (binary[child].count as usize).min(N));
         let share = |lanes: usize| (lanes / classes).max(lanes.saturating_sub(most[1])).clamp(1, most[0]);
-        forests[join] = Forest::join(&forests[left], &forests[right], most, JOINED, |i, j| i == share(i + j));
+        let forest = Forest::join(&class, &below, most, JOINED, |i, j| i == share(i + j));
+        (divisions[join], below) = (forest.left, forest.cost);
     }
-    forests
+    divisions
 }
 
-/// Finds the cheapest way to divide each node of one class.
-fn divide<const N: usize>(binary: &[BinaryNode], forests: &mut [Forest<N>], class: Range<usize>) {
-    let cost = |node: &BinaryNode| math::sqrt(node.cost);
-    let small = || binary[class.clone()].iter().filter(|node| node.count > 1 && node.count as usize <= N);
-    let (sum, count) = small().fold((0.0, 0), |(sum, count), node| (sum + f64::from(cost(node)), count + 1));
+/// Finds the cheapest way to divide each node of one class. Returns the costs of its root.
+fn divide_class<const N: usize>(class: &[BinaryNode], divisions: &mut [Division<N>]) -> [f32; N] {
+    let small = class.iter().filter(|node| node.count > 1 && node.count as usize <= N);
+    let (sum, count) = small.fold((0.0, 0), |(sum, count), node| (sum + f64::from(own_cost(node)), count + 1));
     let node_cost = NODE_COST * (sum / f64::from(count.max(1))) as f32;
-    // Children before parents: a child always lies behind its parent.
-    for (i, node) in class.clone().zip(&binary[class.clone()]).rev().filter(|(_, node)| node.count > 1) {
-        let (left, right) = (i + 1, i + node.link as usize);
-        let most = [left, right].map(|child| (binary[child].count as usize).min(N));
-        forests[i] = Forest::join(&forests[left], &forests[right], most, cost(node) + node_cost, |_, _| true);
+    divide(class, divisions, node_cost)
+}
+
+/// Finds the cheapest way to divide each node of a subtree. Returns the costs of its root: those of all nodes would
+/// take more memory than the tree.
+fn divide<const N: usize>(subtree: &[BinaryNode], divisions: &mut [Division<N>], node_cost: f32) -> [f32; N] {
+    let root = &subtree[0];
+    let mut costs = [[0.0; N]; 2];
+    if root.count == 1 {
+        return costs[0];
     }
+    let right = root.link as usize;
+    let (own, below) = divisions.split_at_mut(1);
+    let (left_divisions, right_divisions) = below.split_at_mut(right - 1);
+    let [left_costs, right_costs] = &mut costs;
+    parallel::both(
+        || *left_costs = divide(&subtree[1..right], left_divisions, node_cost),
+        || *right_costs = divide(&subtree[right..], right_divisions, node_cost),
+        root.count as usize,
+    );
+    let most = [1, right].map(|child| (subtree[child].count as usize).min(N));
+    let forest = Forest::join(&costs[0], &costs[1], most, own_cost(root) + node_cost, |_, _| true);
+    own[0] = forest.left;
+    forest.cost
+}
+
+/// Returns what a cluster costs as a single lane.
+fn own_cost(node: &BinaryNode) -> f32 {
+    math::sqrt(node.cost)
 }
 
 impl<const N: usize> Forest<N> {
-    /// Returns the forest of a node from those of its children, which fill at most `most` lanes each; as a single lane
-    /// the node costs `own` on top. `may_have` tells which numbers of lanes the two may have together.
-    fn join(left: &Self, right: &Self, most: [usize; 2], own: f32, may_have: impl Fn(usize, usize) -> bool) -> Self {
+    /// Returns the forest of a node from the costs of its children, which fill at most `most` lanes each; as a single
+    /// lane the node costs `own` on top. `may_have` tells which numbers of lanes the two may have together.
+    fn join(
+        left: &[f32; N],
+        right: &[f32; N],
+        most: [usize; 2],
+        own: f32,
+        may_have: impl Fn(usize, usize) -> bool,
+    ) -> Self {
         let mut all = Self { cost: [f32::INFINITY; N], left: [0; N] };
         for i in 1..=most[0] {
             for j in (1..=most[1].min(N - i)).filter(|&j| may_have(i, j)) {
-                let cost = left.cost[i - 1] + right.cost[j - 1];
+                let cost = left[i - 1] + right[j - 1];
                 if cost < all.cost[i + j - 1] {
                     (all.cost[i + j - 1], all.left[i + j - 1]) = (cost, i as u8);
                 }
@@ -104,9 +134,9 @@ pub(super) struct LaneCut<const N: usize> {
 
 impl<const N: usize> LaneCut<N> {
     /// Finds the lanes of the wide node made of a binary one.
-    pub(super) fn new(binary: &[BinaryNode], forests: &[Forest<N>], root: usize) -> Self {
+    pub(super) fn new(binary: &[BinaryNode], divisions: &[Division<N>], root: usize) -> Self {
         let mut cut = Self { lanes: [0; N], width: 0 };
-        cut.divide(binary, forests, root, N);
+        cut.divide(binary, divisions, root, N);
         cut
     }
 
@@ -115,15 +145,15 @@ impl<const N: usize> LaneCut<N> {
         &self.lanes[..self.width]
     }
 
-    fn divide(&mut self, binary: &[BinaryNode], forests: &[Forest<N>], node: usize, lanes: usize) {
-        match forests[node].left[lanes - 1] as usize {
+    fn divide(&mut self, binary: &[BinaryNode], divisions: &[Division<N>], node: usize, lanes: usize) {
+        match divisions[node][lanes - 1] as usize {
             0 => {
                 self.lanes[self.width] = node;
                 self.width += 1;
             }
             left => {
-                self.divide(binary, forests, node + 1, left);
-                self.divide(binary, forests, node + binary[node].link as usize, lanes - left);
+                self.divide(binary, divisions, node + 1, left);
+                self.divide(binary, divisions, node + binary[node].link as usize, lanes - left);
             }
         }
     }
