@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 /// From this size on work is worth handing to another thread.
 pub(crate) const WORTHWHILE: usize = 4096;
 /// Elements that are summed up in one go.
-const CHUNK: usize = 1 << 15;
+pub(crate) const CHUNK: usize = 1 << 15;
 
 /// Runs both, side by side if they handle many elements.
 #[cfg(feature = "rayon")]

@@ -4,7 +4,7 @@
 use glam::Vec3A;
 
 use super::cluster::{Cluster, Item, Units};
-use crate::parallel::reduce;
+use crate::parallel::{CHUNK, reduce};
 
 /// Largest number of bins per axis. *Measured* (docs/ACCURACY.md, "Building without cones"): from 8 to 24 bins the
 /// choice is as good, and each bin costs build time.
@@ -31,12 +31,12 @@ pub(super) struct Extent {
 impl Extent {
     /// Measures lights, of which there is at least one.
     pub(super) fn of(items: &[Item]) -> Self {
-        let reference = items[0].normal;
+        let reference = items[0].normal();
         let part = |items: &[Item]| {
             let mut extent =
                 Self { all: Cluster::EMPTY, center_low: Vec3A::INFINITY, center_high: Vec3A::NEG_INFINITY, reference };
             for item in items {
-                extent.all.add(item, turned(item, reference));
+                extent.all.add(item, item.turned_normal(reference));
                 let center = item.double_center();
                 extent.center_low = extent.center_low.min(center);
                 extent.center_high = extent.center_high.max(center);
@@ -57,48 +57,67 @@ impl Extent {
     }
 
     /// Returns the cheapest split found, or `None` where all centers coincide.
-    pub(super) fn cheapest_split(&self, items: &[Item]) -> Option<Split> {
+    pub(super) fn cheapest_split(&self, items: &[Item], scratch: &mut Scratch) -> Option<Split> {
+        let Scratch { bins, sides } = scratch;
         let spread = self.center_high - self.center_low;
         // Few lights leave most bins empty.
         let count = items.len().clamp(FEWEST_BINS, BINS);
         let binning = Binning::new(self.center_low, spread, count);
-        let bins = binning.fill(items, self.reference);
         let edges = self.all.high - self.all.low;
         let longest = edges.max_element();
         let units = Units { pad: PAD, per_length: 1.0 / longest, per_energy: 1.0 / self.all.energy };
+        let one_measure = self.all.has_one_normal().then(|| self.all.orientation_measure());
+        bins.iter_mut().for_each(|bins| bins[..count].fill(Cluster::EMPTY));
+        binning.fill(items, self.reference, one_measure.is_some(), bins);
+        let axes = || (0..3).filter(|&axis| spread[axis] > 0.0);
+        sides.count = 0;
+        axes().for_each(|axis| sides.push(&bins[axis][..count]));
+        let mut costs = sides.costs(&units, one_measure);
         let mut best = None;
         let mut best_cost = f32::INFINITY;
-        for axis in (0..3).filter(|&axis| spread[axis] > 0.0) {
+        for axis in axes() {
             // Long thin boxes are better cut across than along (the paper's k_r).
             let regularity = longest / edges[axis].max(PAD * longest);
-            for (boundary, cost) in costs(&bins[axis][..count], &units) {
+            for (boundary, cost) in (1..count).zip(costs.by_ref()) {
                 let cost = regularity * cost;
+                // Where one side is empty, this is NaN, which is no less than anything.
                 if cost < best_cost {
                     best_cost = cost;
-                    best = Some(Split { binning, axis, boundary });
+                    best = Some((axis, boundary));
                 }
             }
         }
-        best
+        best.map(|(axis, boundary)| binning.split(axis, boundary))
     }
 }
 
-#[inline(always)]
-fn turned(item: &Item, reference: Vec3A) -> Vec3A {
-    if item.two_sided && item.normal.dot(reference) < 0.0 { -item.normal } else { item.normal }
+/// Memory for one split at a time: to clear what a split needs of it is faster than to make all of it each time.
+pub(super) struct Scratch {
+    bins: Bins,
+    sides: Sides,
+}
+
+impl Scratch {
+    pub(super) fn new() -> Self {
+        Self {
+            bins: [[Cluster::EMPTY; BINS]; 3],
+            sides: Sides { clusters: [[Cluster::EMPTY; LANES]; FOURS], count: 0 },
+        }
+    }
 }
 
 /// A boundary between two bins of one axis.
 pub(super) struct Split {
     binning: Binning,
-    axis: usize,
-    boundary: usize,
+    /// Number of the first bin on the right of the boundary, in the component of its axis; NaN in the others.
+    boundary: Vec3A,
 }
 
 impl Split {
     #[inline(always)]
     pub(super) fn is_left(&self, item: &Item) -> bool {
-        self.binning.indices(item)[self.axis] < self.boundary
+        // As bins are numbered, a NaN is in the first one.
+        !self.binning.places(item).cmpge(self.boundary).any()
     }
 }
 
@@ -118,47 +137,99 @@ impl Binning {
         Self { start, scale: Vec3A::splat(bins as f32) / spread, last: bins as u32 - 1 }
     }
 
+    fn split(self, axis: usize, boundary: usize) -> Split {
+        let mut only = Vec3A::NAN;
+        only[axis] = boundary as f32;
+        Split { binning: self, boundary: only }
+    }
+
+    /// Returns the place of a light along each axis, in bins.
+    #[inline(always)]
+    fn places(&self, item: &Item) -> Vec3A {
+        (item.double_center() - self.start) * self.scale
+    }
+
     #[inline(always)]
     fn indices(&self, item: &Item) -> [usize; 3] {
-        let places = (item.double_center() - self.start) * self.scale;
+        let places = self.places(item);
         // A float that is too large or NaN saturates in the cast.
         let index = |place: f32| (place as u32).min(self.last) as usize;
         [index(places.x), index(places.y), index(places.z)]
     }
 
-    fn fill(&self, items: &[Item], reference: Vec3A) -> Bins {
+    /// Adds lights to empty bins. `is_flat` leaves out where they face.
+    fn fill(&self, items: &[Item], reference: Vec3A, is_flat: bool, bins: &mut Bins) {
+        if items.len() <= CHUNK {
+            self.add(items, reference, is_flat, bins);
+            return;
+        }
         let part = |items: &[Item]| {
             let mut bins = [[Cluster::EMPTY; BINS]; 3];
-            for item in items {
-                let normal = turned(item, reference);
-                let indices = self.indices(item);
-                for axis in 0..3 {
-                    bins[axis][indices[axis]].add(item, normal);
-                }
-            }
+            self.add(items, reference, is_flat, &mut bins);
             bins
         };
-        reduce(items, part, |mut a, b| {
+        *bins = reduce(items, part, |mut a, b| {
             let pairs = a.as_flattened_mut().iter_mut().zip(b.as_flattened());
             pairs.for_each(|(a, b)| *a = a.union(b));
             a
-        })
+        });
+    }
+
+    fn add(&self, items: &[Item], reference: Vec3A, is_flat: bool, bins: &mut Bins) {
+        if is_flat {
+            self.add_with(items, bins, |bin, item| bin.add_without_normal(item));
+        } else {
+            self.add_with(items, bins, |bin, item| bin.add(item, item.turned_normal(reference)));
+        }
+    }
+
+    #[inline(always)]
+    fn add_with(&self, items: &[Item], bins: &mut Bins, add: impl Fn(&mut Cluster, &Item)) {
+        for item in items {
+            let indices = self.indices(item);
+            for axis in 0..3 {
+                add(&mut bins[axis][indices[axis]], item);
+            }
+        }
     }
 }
 
-/// Returns the cost of a split in front of each bin that has lights on both sides.
-fn costs(bins: &[Cluster], units: &Units) -> impl Iterator<Item = (usize, f32)> {
-    let mut right_costs = [None; BINS];
-    let mut right = Cluster::EMPTY;
-    for i in (1..bins.len()).rev() {
-        right = right.union(&bins[i]);
-        // All lights have energy.
-        right_costs[i] = (right.energy > 0.0).then(|| right.cost_in(units));
+/// Clusters whose costs are computed at once.
+const LANES: usize = 4;
+/// Most fours of clusters that are compared for one split: two sides of each boundary.
+const FOURS: usize = (3 * 2 * (BINS - 1)).div_ceil(LANES);
+
+/// What is on the left and on the right of each boundary that is compared.
+struct Sides {
+    clusters: [[Cluster; LANES]; FOURS],
+    count: usize,
+}
+
+impl Sides {
+    /// Adds both sides of each boundary between the bins of an axis.
+    fn push(&mut self, bins: &[Cluster]) {
+        let boundaries = bins.len() - 1;
+        let sides = &mut self.clusters.as_flattened_mut()[self.count..self.count + 2 * boundaries];
+        let mut left = Cluster::EMPTY;
+        for (bin, sides) in bins.iter().zip(sides.chunks_exact_mut(2)) {
+            left = left.union(bin);
+            sides[0] = left;
+        }
+        let mut right = Cluster::EMPTY;
+        for (bin, sides) in bins[1..].iter().zip(sides.chunks_exact_mut(2)).rev() {
+            right = right.union(bin);
+            sides[1] = right;
+        }
+        self.count += 2 * boundaries;
     }
-    let mut left = Cluster::EMPTY;
-    (1..bins.len()).filter_map(move |i| {
-        left = left.union(&bins[i - 1]);
-        let right = right_costs[i]?;
-        (left.energy > 0.0).then(|| (i, left.cost_in(units) + right))
-    })
+
+    /// Returns the cost of a split at each boundary: that of both sides together. All clusters have the given `M_Ω` if
+    /// there is one.
+    fn costs(&self, units: &Units, one_measure: Option<f32>) -> impl Iterator<Item = f32> {
+        let mut costs = [[0.0; LANES]; FOURS];
+        for (costs, clusters) in costs.iter_mut().zip(&self.clusters[..self.count.div_ceil(LANES)]) {
+            *costs = Cluster::costs(clusters, units, one_measure).to_array();
+        }
+        (0..self.count).step_by(2).map(move |i| costs.as_flattened()[i] + costs.as_flattened()[i + 1])
+    }
 }

@@ -8,6 +8,7 @@ use smallvec::SmallVec;
 
 use super::binary::partition;
 use super::cluster::Item;
+use crate::parallel;
 use crate::tlas::arity::Arity;
 
 /// Ratio of the largest diagonal to the smallest in a class. Chosen, not swept; the effect of classes is in
@@ -28,13 +29,17 @@ pub(super) fn divide(items: &mut [Item], arity: Arity) -> SmallVec<[usize; MOST_
 
 /// Sorts lights into at most `most` classes, as [`divide`] does.
 pub(super) fn divide_into(items: &mut [Item], most: usize) -> SmallVec<[usize; MOST_CLASSES]> {
-    let diagonal2 = |item: &Item| (item.high - item.low).length_squared();
+    let diagonal2 = |item: &Item| (item.high() - item.low()).length_squared();
     let mut classes = SmallVec::new();
     let mut rest = items;
     while classes.len() + 1 < most {
-        let largest2 = rest.iter().map(diagonal2).fold(0.0, f32::max);
+        let part = |items: &[Item]| {
+            let diagonals2 = items.iter().map(diagonal2);
+            diagonals2.fold((f32::INFINITY, 0.0f32), |(least2, largest2), d2| (least2.min(d2), largest2.max(d2)))
+        };
+        let (smallest2, largest2) = parallel::reduce(rest, part, |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let least2 = largest2 * (1.0 / (CLASS_RATIO * CLASS_RATIO));
-        if rest.iter().all(|item| diagonal2(item) >= least2) {
+        if smallest2 >= least2 {
             break;
         }
         let count = partition(rest, |item| diagonal2(item) >= least2);
@@ -67,7 +72,7 @@ mod tests {
     fn classes(diagonals: &[f32], arity: Arity) -> (Vec<usize>, Vec<u32>) {
         let mut items = items(diagonals);
         let classes = divide(&mut items, arity).to_vec();
-        (classes, items.iter().map(|item| item.light).collect())
+        (classes, items.iter().map(|item| item.light()).collect())
     }
 
     #[test]

@@ -4,43 +4,81 @@
 //! no trigonometry, where the union of two cones takes two arcs and a turn. The cones of the finished tree are made of
 //! the lights themselves.
 
-use glam::Vec3A;
+use glam::{Mat4, Vec3A, Vec4};
 
-use crate::bounds::{LightBounds, orientation_measure};
-use crate::math;
+use crate::bounds::{LightBounds, orientation_measures};
 
 /// Least squared length of the middle of a box of unit normals. Below it, the normals count as pointing everywhere: the
 /// middle is no direction any more, and dividing by its length would only enlarge rounding. Affects costs alone.
 /// *Measured*: docs/ACCURACY.md, "Constants of the build"; not sensitive.
 const LEAST_MIDDLE2: f32 = 1e-4;
 
-/// A light on its way into the tree.
+/// A light on its way into the tree. Fourth components hold what has no vector of its own: a build reads and moves all
+/// lights at every level, so it pays to keep them small.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
-    pub(super) low: Vec3A,
-    pub(super) high: Vec3A,
-    pub(super) normal: Vec3A,
-    pub(super) energy: f32,
-    pub(super) two_sided: bool,
-    pub(super) light: u32,
+    /// Lower corner of the box, and the energy.
+    low_and_energy: Vec4,
+    /// Upper corner of the box, and bits: the number of the light, and [`Self::TWO_SIDED`].
+    high_and_light: Vec4,
+    normal: Vec3A,
 }
 
+const _: () = assert!(size_of::<Item>() == 48);
+
 impl Item {
+    /// Marks a light that sends from its back as well. Numbers of lights stay below it.
+    const TWO_SIDED: u32 = 1 << 31;
+
     pub(super) fn new(bounds: &LightBounds, light: u32) -> Self {
+        let bits = light | if bounds.two_sided { Self::TWO_SIDED } else { 0 };
         Self {
-            low: bounds.aabb.min.into(),
-            high: bounds.aabb.max.into(),
+            low_and_energy: bounds.aabb.min.extend(bounds.energy()),
+            high_and_light: bounds.aabb.max.extend(f32::from_bits(bits)),
             normal: bounds.normals.axis.into(),
-            energy: bounds.energy(),
-            two_sided: bounds.two_sided,
-            light,
         }
+    }
+
+    #[inline(always)]
+    pub(super) fn low(&self) -> Vec3A {
+        Vec3A::from_vec4(self.low_and_energy)
+    }
+
+    #[inline(always)]
+    pub(super) fn high(&self) -> Vec3A {
+        Vec3A::from_vec4(self.high_and_light)
     }
 
     /// Returns twice the center of the box; coordinates are small enough to be added.
     #[inline(always)]
     pub(super) fn double_center(&self) -> Vec3A {
-        self.low + self.high
+        self.low() + self.high()
+    }
+
+    /// Returns the normal, which that of a two-sided light is turned to the side of `reference`: its sign says nothing.
+    #[inline(always)]
+    pub(super) fn turned_normal(&self, reference: Vec3A) -> Vec3A {
+        if self.is_two_sided() && self.normal.dot(reference) < 0.0 { -self.normal } else { self.normal }
+    }
+
+    #[inline(always)]
+    pub(super) fn normal(&self) -> Vec3A {
+        self.normal
+    }
+
+    #[inline(always)]
+    pub(super) fn energy(&self) -> f32 {
+        self.low_and_energy.w
+    }
+
+    #[inline(always)]
+    pub(super) fn light(&self) -> u32 {
+        self.high_and_light.w.to_bits() & !Self::TWO_SIDED
+    }
+
+    #[inline(always)]
+    fn is_two_sided(&self) -> bool {
+        self.high_and_light.w.to_bits() & Self::TWO_SIDED != 0
     }
 }
 
@@ -68,12 +106,18 @@ impl Cluster {
     /// Adds a light whose normal has been turned to the wanted side.
     #[inline(always)]
     pub(super) fn add(&mut self, item: &Item, normal: Vec3A) {
-        self.low = self.low.min(item.low);
-        self.high = self.high.max(item.high);
+        self.add_without_normal(item);
         self.normal_low = self.normal_low.min(normal);
         self.normal_high = self.normal_high.max(normal);
-        self.energy += item.energy;
-        self.two_sided |= item.two_sided;
+        self.two_sided |= item.is_two_sided();
+    }
+
+    /// Adds a light, but not where it faces.
+    #[inline(always)]
+    pub(super) fn add_without_normal(&mut self, item: &Item) {
+        self.low = self.low.min(item.low());
+        self.high = self.high.max(item.high());
+        self.energy += item.energy();
     }
 
     #[inline(always)]
@@ -88,33 +132,64 @@ impl Cluster {
         }
     }
 
+    /// Whether all normals agree, and are those of lights with one side.
+    pub(super) fn has_one_normal(&self) -> bool {
+        self.normal_low == self.normal_high && !self.two_sided
+    }
+
     /// Returns `M_A · M_Ω · energy` of the heuristic.
     pub(super) fn cost(&self) -> f32 {
-        self.cost_in(&Units { pad: 0.0, per_length: 1.0, per_energy: 1.0 })
+        Self::costs(&[*self; 4], &Units { pad: 0.0, per_length: 1.0, per_energy: 1.0 }, None).x
     }
 
-    #[inline]
-    pub(super) fn cost_in(&self, units: &Units) -> f32 {
-        let e = (self.high - self.low) * units.per_length + Vec3A::splat(units.pad);
-        let area = 2.0 * (e.x * e.y + e.y * e.z + e.z * e.x);
-        area * orientation_measure(self.least_cos(), self.two_sided) * (self.energy * units.per_energy)
+    /// Returns `M_Ω` of the heuristic.
+    pub(super) fn orientation_measure(&self) -> f32 {
+        Self::orientation_measures(&[*self; 4]).x
     }
 
-    /// Returns the least cosine of the angle between a normal and the middle of all.
-    #[inline]
-    fn least_cos(&self) -> f32 {
-        let middle = 0.5 * (self.normal_low + self.normal_high);
-        let half = 0.5 * (self.normal_high - self.normal_low);
-        let length2 = middle.length_squared();
-        if length2 < LEAST_MIDDLE2 {
-            return -1.0;
-        }
-        let inverse = 1.0 / math::sqrt(length2);
-        // By the corner of the box that is farthest back, and by the ball around the box; the larger one is true, too.
-        let by_corner = (length2 - middle.abs().dot(half)) * inverse;
-        let by_ball = 0.5 * (1.0 + length2 - half.length_squared()) * inverse;
-        by_corner.max(by_ball).clamp(-1.0, 1.0)
+    /// Returns `M_A · M_Ω · energy` of four clusters, all of which have the given `M_Ω` if there is one.
+    #[inline(always)]
+    pub(super) fn costs(clusters: &[Self; 4], units: &Units, one_measure: Option<f32>) -> Vec4 {
+        let edges = components(clusters.each_ref().map(|cluster| cluster.high - cluster.low));
+        let [x, y, z] = edges.map(|edge| edge * units.per_length + units.pad);
+        let areas = 2.0 * (x * y + y * z + z * x);
+        let measures = one_measure.map_or_else(|| Self::orientation_measures(clusters), Vec4::splat);
+        let energies = Vec4::from_array(clusters.each_ref().map(|cluster| cluster.energy));
+        areas * measures * (energies * units.per_energy)
     }
+
+    /// Returns `M_Ω` of four clusters.
+    #[inline(always)]
+    fn orientation_measures(clusters: &[Self; 4]) -> Vec4 {
+        let clusters = clusters.each_ref();
+        let low = components(clusters.map(|cluster| cluster.normal_low));
+        let high = components(clusters.map(|cluster| cluster.normal_high));
+        let sides = clusters.map(|cluster| if cluster.two_sided { 2.0 } else { 1.0 });
+        orientation_measures(least_cos(low, high), Vec4::from_array(sides))
+    }
+}
+
+/// Returns the three components of four vectors each.
+#[inline(always)]
+fn components(vectors: [Vec3A; 4]) -> [Vec4; 3] {
+    let [a, b, c, d] = vectors.map(|vector| vector.extend(0.0));
+    let rows = Mat4::from_cols(a, b, c, d).transpose();
+    [rows.x_axis, rows.y_axis, rows.z_axis]
+}
+
+/// Returns the least cosine of the angle between a normal and the middle of all, in four boxes of normals.
+#[inline(always)]
+fn least_cos(low: [Vec4; 3], high: [Vec4; 3]) -> Vec4 {
+    let middle = [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
+    let half = [0, 1, 2].map(|axis| 0.5 * (high[axis] - low[axis]));
+    let dot = |a: [Vec4; 3], b: [Vec4; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let length2 = dot(middle, middle);
+    let inverse = 1.0 / length2.sqrt();
+    // By the corner of the box that is farthest back, and by the ball around the box; the larger one is true, too.
+    let by_corner = (length2 - dot(middle.map(Vec4::abs), half)) * inverse;
+    let by_ball = 0.5 * (1.0 + length2 - dot(half, half)) * inverse;
+    let cos = by_corner.max(by_ball).max(Vec4::NEG_ONE).min(Vec4::ONE);
+    Vec4::select(length2.cmplt(Vec4::splat(LEAST_MIDDLE2)), Vec4::NEG_ONE, cos)
 }
 
 /// Units of costs, which keep the costs of tiny or dark lights apart.

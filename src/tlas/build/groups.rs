@@ -25,9 +25,9 @@ const MOST_SETS: usize = 4;
 /// Sorts lights into classes, by sets of groups first and by size then. Returns the number of lights in each class.
 /// Sets with less energy than the first ones share the last.
 pub(super) fn divide_groups(items: &mut [Item], groups: &[u32], arity: Arity) -> SmallVec<[usize; MOST_CLASSES]> {
-    let set = |item: &Item| groups[item.light as usize];
+    let set = |item: &Item| groups[item.light() as usize];
     let mut energies = BTreeMap::new();
-    items.iter().for_each(|item| *energies.entry(set(item)).or_insert(0.0) += f64::from(item.energy));
+    items.iter().for_each(|item| *energies.entry(set(item)).or_insert(0.0) += f64::from(item.energy()));
     let mut sets: Vec<(u32, f64)> = energies.into_iter().collect();
     sets.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     // At least two lanes for a class.

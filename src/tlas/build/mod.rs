@@ -12,7 +12,6 @@ mod fit;
 mod forest;
 mod groups;
 
-use alloc::vec;
 use alloc::vec::Vec;
 
 use binary::{BinaryNode, join};
@@ -58,7 +57,7 @@ pub(crate) fn build_in_groups(
     }
     let arity = arity.narrowed_to(count);
     let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
-    let mut binary = vec![BinaryNode::default(); 2 * count - 1];
+    let mut binary: Vec<BinaryNode> = bytemuck::zeroed_vec(2 * count - 1);
     let classes = if groups.is_empty() { divide(&mut items, arity) } else { divide_groups(&mut items, groups, arity) };
     join(&mut items, &mut binary, &classes, progress);
     progress.check()?;
@@ -82,7 +81,7 @@ pub(super) fn arrange(arity: Arity, lights: &[LightBounds]) -> Option<(Tlas, Vec
         return None;
     }
     let mut items = parallel::collect(count, |i| Item::new(&lights[i], i as u32));
-    let mut binary = vec![BinaryNode::default(); 2 * count - 1];
+    let mut binary: Vec<BinaryNode> = bytemuck::zeroed_vec(2 * count - 1);
     join(&mut items, &mut binary, &[count], &Progress::new(None, 1.0));
     Some(match arity {
         Arity::Four => collapse::<4>(arity, &binary),
