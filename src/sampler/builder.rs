@@ -99,7 +99,8 @@ impl<'a> LightSamplerBuilder<'a> {
     /// ([`SampledLight`](crate::SampledLight)), chosen by what each is estimated to send to the point. One call thus
     /// replaces [`PointSampler::sample`](crate::PointSampler::sample) and [`Environment::sample`], and a path vertex
     /// needs one shadow ray instead of two. The estimate knows of no walls: where all that is seen of the environment
-    /// is seen through portals, leave this off.
+    /// is seen through portals, leave this off. Where lamps are often hidden,
+    /// [`sample_split`](crate::PointSampler::sample_split) without any splitting draws one of each, for a ray more.
     ///
     /// Without any triangle, the environment is the only light. A black environment is none.
     pub fn environment_as_light(mut self) -> Self {

@@ -32,8 +32,9 @@ const MAX_IRRADIANCE: f32 = 1e35;
 /// lights next to both. Estimates know of no walls: the environment may be all but hidden where a lamp is not, and a
 /// lamp where the environment is not.
 ///
-/// Measured on the host bench's street (docs/CONSTANTS.md). A larger value wastes samples where one of both outshines
-/// the other; with a smaller one, what is dark by the estimates alone is noisier, by the inverse of this.
+/// Measured on the host bench's street and with hidden lamps (docs/CONSTANTS.md). A larger value wastes samples where
+/// one of both outshines the other: the second moment there grows by at most 1 / (1 - p). With a smaller one, what is
+/// dark by the estimates alone is noisier: its second moment is at most 1 / p of what its own samples have.
 const LEAST_BESIDE: f64 = 0.1;
 
 /// Probability of one of two techniques that do not know each other's walls, by estimates of the irradiance from both.

@@ -19,6 +19,7 @@ mod double_check;
 mod edits;
 mod emission;
 mod environment_light;
+mod environment_share;
 mod errors;
 mod few;
 // The files are of a machine that writes the least byte first.
