@@ -48,6 +48,12 @@ impl VisibleFeatures {
     }
 
     /// Appends the parts of portals that a group of features is visible through, as long as there are fewer than `end`.
+    ///
+    /// A group with more parts becomes one entry for all portals, with an irradiance estimated from the parts that were
+    /// measured: the first ones in the order of the tree over the lights. Groups come in the order in which
+    /// [`Groups::fill`] divided them, and not by energy: a late group finds only the places that earlier ones left.
+    /// Which groups lose their walls thus depends on the features and the shading point, and the order in which meshes
+    /// were added decides at most which parts of one group are measured.
     fn find_group(&mut self, Group { node, cosine }: Group, end: usize, at: &Viewpoint<'_>) {
         let environment = &at.scene.environment;
         let FeatureNode { sin_radius, power, .. } = environment.feature_nodes()[node as usize];
