@@ -2,9 +2,14 @@
 //!
 //! A file holds a table of candelas by vertical and horizontal angle. Of photometry of type C, the usual one, the
 //! vertical angle is 0 straight down and 180 degrees straight up, and horizontal angles grow counter-clockwise as seen
-//! from above. Types A and B (automotive lamps and floodlights) have other angles, and are refused. Lumens, sizes and
-//! powers are read over, and so is what a tilt of the lamp changes: the luminaire is in the position in which it was
-//! measured.
+//! from above. Lumens, sizes and powers are read over, and so is what a tilt of the lamp changes: the luminaire is in
+//! the position in which it was measured.
+//!
+//! Types A (automotive lamps) and B (floodlights) are latitudes and longitudes around the aim of the lamp, where both
+//! angles are zero. Seen from the lamp, positive vertical angles are above the aim and positive horizontal ones to the
+//! right of it (LM-63-2002, section 3: horizontal angles are clockwise). The poles are above and below the lamp in
+//! type A, and to its left and right in type B. In both cases these are the poles of the table of type C in another
+//! position, so that no value is interpolated: [`Photometry`] says which position.
 
 use core::f32::consts::PI;
 
@@ -16,6 +21,47 @@ const OLD: [&str; 3] = ["IESNA91", "IESNA:LM-63-1991", "IESNA:LM-63-1995"];
 const HEADER: usize = 13;
 /// Most angles of either kind.
 const MOST_ANGLES: usize = 2048;
+/// Degrees from the edge of a table of type A or B to where it is dark. A larger angle lets light out beside the table;
+/// one of less than 1e-4 is lost in the rounding of angles to single precision.
+const EDGE: f32 = 0.01;
+
+/// Types of photometry, and the angles of type C that are those of the others. The angles are those of Cycles
+/// (`process_type_a` and `process_type_b` in its `util/ies.cpp`), so that a file looks as it does there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Photometry {
+    /// Vertical angle 0 is the axis.
+    C,
+    /// The axis is to the left: `[H + 90, V + 90]` of type C, vertical angle first. The lamp is aimed at `[90, 90]`,
+    /// and what is above it is at `[90, 180]`.
+    B,
+    /// The axis is below: `[V + 90, 180 - H]`. The lamp is aimed at `[90, 180]`, and its right is at `[90, 90]`.
+    A,
+}
+
+impl Photometry {
+    fn of(code: f32) -> Result<Self, Error> {
+        match code {
+            1.0 => Ok(Self::C),
+            2.0 => Ok(Self::B),
+            3.0 => Ok(Self::A),
+            _ => Err(format!("its photometry is of type {code}, but must be 1 (C), 2 (B) or 3 (A)").into()),
+        }
+    }
+
+    /// Least number of horizontal angles: only around the axis of type C, one can stand for all.
+    const fn least_horizontal(self) -> usize {
+        if matches!(self, Self::C) { 1 } else { 2 }
+    }
+
+    /// Ranges of vertical and horizontal angles.
+    const fn ranges(self) -> [[f32; 2]; 2] {
+        if matches!(self, Self::C) { [[0.0, 180.0], [0.0, 360.0]] } else { [[-90.0, 90.0]; 2] }
+    }
+}
+
+/// Angles of a table in degrees, each with the index of the angle of the file whose values it has. Without one it is
+/// dark.
+type Side = Vec<(f32, Option<usize>)>;
 
 /// A table as `fanlight` has it: radians, all around the axis, counter-clockwise around a vertical angle 0 that looks
 /// at the viewer.
@@ -42,37 +88,95 @@ pub(crate) fn read(text: &str) -> Result<Luminaire, Error> {
         numbers.list("tilt angle or factor", 2 * count)?;
     }
     let header: Vec<f32> = numbers.list("number before the angles", HEADER)?;
-    let (counts, kind) = ([count_of(header[3], "vertical")?, count_of(header[4], "horizontal")?], header[5]);
-    if kind != 1.0 {
-        let name =
-            [(2.0, "B"), (3.0, "A")].into_iter().find(|(code, _)| *code == kind).map_or("unknown", |(_, name)| name);
-        return Err(format!("its photometry is of type {name} ({kind}), but only type C (1) is read").into());
-    }
+    let photometry = Photometry::of(header[5])?;
+    let counts =
+        [count_of(header[3], "vertical", 2)?, count_of(header[4], "horizontal", photometry.least_horizontal())?];
     let scale = header[2] * header[10] * if is_old { header[11] } else { 1.0 };
     if !(scale >= 0.0 && scale.is_finite()) {
         return Err(format!("candelas are multiplied by {scale}").into());
     }
-    let vertical = angles(numbers.list("vertical angle", counts[0])?, "vertical", [0.0, 180.0])?;
-    let horizontal = angles(numbers.list("horizontal angle", counts[1])?, "horizontal", [0.0, 360.0])?;
+    let [above, around] = photometry.ranges();
+    let vertical = angles(numbers.list("vertical angle", counts[0])?, "vertical", above)?;
+    let horizontal = angles(numbers.list("horizontal angle", counts[1])?, "horizontal", around)?;
     let candelas: Vec<f32> = numbers.list("candela value", counts[0] * counts[1])?;
     if let Some(at) = candelas.iter().position(|value| !(*value >= 0.0 && value.is_finite())) {
         return Err(format!("candela value {at} is {}", candelas[at]).into());
     }
-    let around = all_around(&horizontal)?;
-    let rows = 0..vertical.len();
-    let intensities = rows.flat_map(|row| around.iter().map(move |(_, column)| (row, *column)));
-    Ok(Luminaire {
-        intensities: intensities.map(|(row, column)| scale * candelas[column * vertical.len() + row]).collect(),
-        horizontal: around.iter().map(|(angle, _)| angle.to_radians()).collect(),
-        vertical: vertical.iter().map(|angle| angle.to_radians().min(PI)).collect(),
+    let value = |vertical: usize, horizontal: usize| scale * candelas[horizontal * counts[0] + vertical];
+    Ok(match photometry {
+        Photometry::C => tabulate(numbered(&vertical), all_around(&horizontal)?, value),
+        Photometry::B => {
+            // Rows are the horizontal angles: what is between them is a cone around the axis to the left.
+            let columns = in_front(mirrored(&vertical), |angle| angle + 90.0);
+            tabulate(from_pole(mirrored(&horizontal)), columns, |row, column| value(column, row))
+        }
+        Photometry::A => {
+            // As in Cycles, vertical angles from 0 on are not mirrored: such a lamp is dark below its aim.
+            let columns = in_front(mirrored(&horizontal), |angle| 180.0 - angle);
+            tabulate(from_pole(numbered(&vertical)), columns, value)
+        }
     })
 }
 
-/// Returns horizontal angles all around, each with the number of the one that its values are those of. Files have less
-/// of what is symmetric: one angle, a quarter, the half from 0 to 180 degrees, or that from 90 to 270.
-fn all_around(angles: &[f32]) -> Result<Vec<(f32, usize)>, Error> {
-    let mut around: Vec<(f32, usize)> = angles.iter().copied().zip(0..).collect();
-    let mirror = |around: &mut Vec<(f32, usize)>, sum: f32| {
+/// Makes a table of rows and columns that are in degrees of type C.
+fn tabulate(rows: Side, mut columns: Side, value: impl Fn(usize, usize) -> f32) -> Luminaire {
+    // From counter-clockwise to clockwise, as the axis looks down.
+    columns.iter_mut().for_each(|(angle, _)| *angle = (360.0 - *angle).rem_euclid(360.0));
+    columns.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let [rows, columns] = [rows, columns].map(distinct_radians);
+    let of_row = |row: Option<usize>| {
+        let of_pair = |column: Option<usize>| row.zip(column).map_or(0.0, |(row, column)| value(row, column));
+        columns.iter().map(|(_, column)| of_pair(*column)).collect::<Vec<_>>()
+    };
+    Luminaire {
+        intensities: rows.iter().flat_map(|(_, row)| of_row(*row)).collect(),
+        vertical: rows.iter().map(|(angle, _)| angle.min(PI)).collect(),
+        horizontal: columns.iter().map(|(angle, _)| *angle).collect(),
+    }
+}
+
+/// Returns ascending angles in radians. Of angles that are there twice, or that rounding makes the same, the first
+/// counts.
+fn distinct_radians(mut side: Side) -> Side {
+    side.iter_mut().for_each(|(angle, _)| *angle = angle.to_radians());
+    side.dedup_by(|b, a| b.0 == a.0);
+    side
+}
+
+fn numbered(angles: &[f32]) -> Side {
+    angles.iter().enumerate().map(|(at, angle)| (*angle, Some(at))).collect()
+}
+
+/// Returns angles on both sides of the aim. Files that start at 0 have one side of what is symmetric.
+fn mirrored(angles: &[f32]) -> Side {
+    let one = numbered(angles);
+    if angles[0] != 0.0 {
+        return one;
+    }
+    let other = one.iter().skip(1).rev().map(|(angle, at)| (-angle, *at));
+    other.chain(one.iter().copied()).collect()
+}
+
+/// Counts angles from a pole instead of the equator.
+fn from_pole(mut side: Side) -> Side {
+    side.iter_mut().for_each(|(angle, _)| *angle += 90.0);
+    side
+}
+
+/// Returns angles around the axis by those to both sides of the aim. A profile goes on from its last angle to its
+/// first, here through what is behind the lamp and was not measured: it is dark, from next to the edges on.
+fn in_front(mut side: Side, to_c: impl Fn(f32) -> f32) -> Side {
+    let [first, last] = [side[0].0, side[side.len() - 1].0];
+    side.extend([(first - EDGE, None), (last + EDGE, None)]);
+    side.iter_mut().for_each(|(angle, _)| *angle = to_c(*angle));
+    side
+}
+
+/// Returns horizontal angles of type C all around. Files have less of what is symmetric: one angle, a quarter, the half
+/// from 0 to 180 degrees, or that from 90 to 270.
+fn all_around(angles: &[f32]) -> Result<Side, Error> {
+    let mut around = numbered(angles);
+    let mirror = |around: &mut Side, sum: f32| {
         for (angle, column) in around.clone() {
             around.push(((sum - angle).rem_euclid(360.0), column));
         }
@@ -92,11 +196,6 @@ fn all_around(angles: &[f32]) -> Result<Vec<(f32, usize)>, Error> {
             );
         }
     }
-    // From clockwise to counter-clockwise, as the axis looks down.
-    around.iter_mut().for_each(|(angle, _)| *angle = (360.0 - *angle).rem_euclid(360.0));
-    // Of angles that are there twice, the first counts.
-    around.sort_by(|a, b| a.0.total_cmp(&b.0));
-    around.dedup_by(|b, a| b.0 == a.0);
     Ok(around)
 }
 
@@ -115,9 +214,8 @@ fn angles(angles: Vec<f32>, kind: &str, [low, high]: [f32; 2]) -> Result<Vec<f32
     }
 }
 
-fn count_of(value: f32, kind: &str) -> Result<usize, Error> {
-    let least = if kind == "vertical" { 2.0 } else { 1.0 };
-    let is_count = value.fract() == 0.0 && (least..=MOST_ANGLES as f32).contains(&value);
+fn count_of(value: f32, kind: &str, least: usize) -> Result<usize, Error> {
+    let is_count = value.fract() == 0.0 && (least as f32..=MOST_ANGLES as f32).contains(&value);
     if is_count {
         Ok(value as usize)
     } else {

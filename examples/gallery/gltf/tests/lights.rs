@@ -67,11 +67,11 @@ fn measured_profiles() {
         2.0 * f64::from(profile.intensity(angles))
     };
     assert_near(brightness(&read.model), expected(|step| of_intensity(intensity(step), step)), EXACT);
-    // Type B is refused, by name.
-    let uri = uri.replace("2.0 5 3 1 2", "2.0 5 3 2 2");
+    // A type that there is not is refused.
+    let uri = uri.replace("2.0 5 3 1 2", "2.0 5 3 4 2");
     file.json["extensions"] = json!({ "EXT_lights_ies": { "lights": [{ "uri": uri }] } });
     let error = file.error();
-    assert!(error.contains("type B") && error.contains("node 0"), "{error}");
+    assert!(error.contains("type 4") && error.contains("node 0"), "{error}");
 }
 
 #[test]
