@@ -13,6 +13,8 @@
 
 use core::f32::consts::PI;
 
+use glam::Vec3;
+
 use crate::render::Error;
 
 /// First lines of files up to 1995, in which a factor of the ballast stands where later ones have none.
@@ -26,7 +28,8 @@ const MOST_ANGLES: usize = 2048;
 const EDGE: f32 = 0.01;
 
 /// Types of photometry, and the angles of type C that are those of the others. The angles are those of Cycles
-/// (`process_type_a` and `process_type_b` in its `util/ies.cpp`), so that a file looks as it does there.
+/// (`process_type_a` and `process_type_b` in its `util/ies.cpp`), so that a table is the same as there. A scene
+/// turns the table to where the lamp is aimed, by its [`frame`](Photometry::frame).
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Photometry {
     /// Vertical angle 0 is the axis.
@@ -53,6 +56,17 @@ impl Photometry {
         if matches!(self, Self::C) { 1 } else { 2 }
     }
 
+    /// Axis and horizontal angle 0 of the table, in the frame of `EXT_lights_ies`: the point of both angles 0 of the
+    /// file is along -z, and vertical angles at horizontal angle 0 are in the plane of x and z. They grow towards x, as
+    /// the extension has it for type C. Horizontal angles of types A and B are clockwise, and grow towards -y.
+    const fn frame(self) -> [Vec3; 2] {
+        match self {
+            Self::C => [Vec3::NEG_Z, Vec3::X],
+            Self::B => [Vec3::Y, Vec3::NEG_X],
+            Self::A => [Vec3::NEG_X, Vec3::Z],
+        }
+    }
+
     /// Ranges of vertical and horizontal angles.
     const fn ranges(self) -> [[f32; 2]; 2] {
         if matches!(self, Self::C) { [[0.0, 180.0], [0.0, 360.0]] } else { [[-90.0, 90.0]; 2] }
@@ -69,6 +83,8 @@ type Side = Vec<(f32, Option<usize>)>;
 pub(crate) struct Luminaire {
     pub(crate) vertical: Vec<f32>,
     pub(crate) horizontal: Vec<f32>,
+    /// Direction of vertical angle 0, and that of horizontal angle 0, for a luminaire whose angles of 0 are along -z.
+    pub(crate) frame: [Vec3; 2],
     /// Candelas: those of all horizontal angles for the first vertical one, then for the next.
     pub(crate) intensities: Vec<f32>,
 }
@@ -103,23 +119,24 @@ pub(crate) fn read(text: &str) -> Result<Luminaire, Error> {
         return Err(format!("candela value {at} is {}", candelas[at]).into());
     }
     let value = |vertical: usize, horizontal: usize| scale * candelas[horizontal * counts[0] + vertical];
+    let frame = photometry.frame();
     Ok(match photometry {
-        Photometry::C => tabulate(numbered(&vertical), all_around(&horizontal)?, value),
+        Photometry::C => tabulate(frame, numbered(&vertical), all_around(&horizontal)?, value),
         Photometry::B => {
             // Rows are the horizontal angles: what is between them is a cone around the axis to the left.
             let columns = in_front(mirrored(&vertical), |angle| angle + 90.0);
-            tabulate(from_pole(mirrored(&horizontal)), columns, |row, column| value(column, row))
+            tabulate(frame, from_pole(mirrored(&horizontal)), columns, |row, column| value(column, row))
         }
         Photometry::A => {
             // As in Cycles, vertical angles from 0 on are not mirrored: such a lamp is dark below its aim.
             let columns = in_front(mirrored(&horizontal), |angle| 180.0 - angle);
-            tabulate(from_pole(numbered(&vertical)), columns, value)
+            tabulate(frame, from_pole(numbered(&vertical)), columns, value)
         }
     })
 }
 
 /// Makes a table of rows and columns that are in degrees of type C.
-fn tabulate(rows: Side, mut columns: Side, value: impl Fn(usize, usize) -> f32) -> Luminaire {
+fn tabulate(frame: [Vec3; 2], rows: Side, mut columns: Side, value: impl Fn(usize, usize) -> f32) -> Luminaire {
     // From counter-clockwise to clockwise, as the axis looks down.
     columns.iter_mut().for_each(|(angle, _)| *angle = (360.0 - *angle).rem_euclid(360.0));
     columns.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -129,6 +146,7 @@ fn tabulate(rows: Side, mut columns: Side, value: impl Fn(usize, usize) -> f32) 
         columns.iter().map(|(_, column)| of_pair(*column)).collect::<Vec<_>>()
     };
     Luminaire {
+        frame,
         intensities: rows.iter().flat_map(|(_, row)| of_row(*row)).collect(),
         vertical: rows.iter().map(|(angle, _)| angle.min(PI)).collect(),
         horizontal: columns.iter().map(|(angle, _)| *angle).collect(),

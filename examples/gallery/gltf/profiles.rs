@@ -1,6 +1,6 @@
 //! Lights with measured profiles (`EXT_lights_ies`).
 
-use glam::{Mat4, Vec3};
+use glam::{Mat3, Mat4, Vec3};
 use serde::Deserialize;
 
 use super::alloc::sync::Arc;
@@ -40,8 +40,8 @@ const fn white() -> [f32; 3] {
     [1.0; 3]
 }
 
-/// The light that a node holds, and what a list says of it. Vertical angle 0 is along -z, and horizontal angle 0 along
-/// x.
+/// The light that a node holds, and what a list says of it. The point of both angles 0 is along -z, for all types of
+/// photometry ("Coordinate System Mapping" of the extension), and the vertical plane is that of x and z.
 pub(super) fn of_node(data: &Data<'_>, node: &Node, transform: &Mat4) -> Result<Option<(Lamp, String)>, Error> {
     let Some(Reference { light, multiplier, color }) = extension(&node.extensions, NAME)? else { return Ok(None) };
     let lights = data.document.extensions.get(NAME).and_then(|extension| extension.get("lights")?.as_array());
@@ -63,9 +63,16 @@ pub(super) fn of_node(data: &Data<'_>, node: &Node, transform: &Mat4) -> Result<
         )));
     }
     let described = format!("light profile {light} of up to {} candela", brightest * strength);
-    let Luminaire { vertical, horizontal, intensities } = luminaire;
-    let axis = -transform.z_axis.truncate().normalize_or(Vec3::Z);
-    let zero = transform.x_axis.truncate().reject_from_normalized(axis).normalize_or(axis.any_orthonormal_vector());
+    let Luminaire { vertical, horizontal, frame, intensities } = luminaire;
+    let rotation = rotation(transform);
+    let [axis, zero] = frame.map(|direction| rotation * direction);
     let diagram = Diagram { axis, zero, vertical, horizontal, intensities };
     Ok(Some((Lamp { kind: LampKind::Luminaire(transform.w_axis.truncate(), Arc::new(diagram)), strength }, described)))
+}
+
+/// Returns the rotation of a node. Its z and x are kept, and y is so that scales and mirrors do not change a light.
+fn rotation(transform: &Mat4) -> Mat3 {
+    let z = transform.z_axis.truncate().normalize_or(Vec3::Z);
+    let x = transform.x_axis.truncate().reject_from_normalized(z).normalize_or(z.any_orthonormal_vector());
+    Mat3::from_cols(x, z.cross(x), z)
 }

@@ -20,7 +20,7 @@ fn table(text: &str) -> Luminaire {
 
 /// Candelas in a direction of the file: degrees of both angles.
 fn candelas(luminaire: &Luminaire, vertical: f32, horizontal: f32) -> f32 {
-    let Luminaire { vertical: rows, horizontal: columns, intensities } = luminaire;
+    let Luminaire { vertical: rows, horizontal: columns, intensities, .. } = luminaire;
     let profile = fanlight::Profile { vertical: rows, horizontal: columns, intensities };
     // The other way around the axis.
     profile.intensity([vertical.to_radians().into(), (-horizontal).to_radians().into()])
@@ -47,7 +47,7 @@ fn the_sample_has_its_numbers() {
     // Between the angles it is linear, and above the horizon zero.
     assert_candelas(&luminaire, &[[45.0, 22.5, 140.0], [33.75, 0.0, 115.0], [90.0, 10.0, 0.0], [120.0, 0.0, 0.0]]);
     // It is a profile that a sampler accepts.
-    let Luminaire { vertical, horizontal, intensities } = &luminaire;
+    let Luminaire { vertical, horizontal, intensities, .. } = &luminaire;
     let profile = fanlight::Profile { vertical, horizontal, intensities };
     fanlight::LightSampler::builder().add_profile(&profile).expect("a valid profile");
 }
@@ -235,6 +235,42 @@ fn types_agree() {
     }
 }
 
+/// Candelas in a direction of the frame in which both angles 0 are along -z.
+fn towards_in_frame(luminaire: &Luminaire, direction: Vec3) -> f32 {
+    let [axis, zero] = luminaire.frame;
+    let horizontal = direction.dot(axis.cross(zero)).atan2(direction.dot(zero));
+    // The other way around the axis in files.
+    candelas(luminaire, axis.dot(direction).clamp(-1.0, 1.0).acos().to_degrees(), -horizontal.to_degrees())
+}
+
+/// What the types call right of the aim and above it is the same side of it.
+#[test]
+fn frames_agree() {
+    let (aim, right, up) = (Vec3::NEG_Z, Vec3::NEG_Y, Vec3::X);
+    let all = steps(-90.0, 90.0, 5.0);
+    // Of type C, the vertical angle is away from the aim, at first towards what is above, and then counter-clockwise.
+    let wide = |[v, h]: [f32; 2]| {
+        let [(sin_v, cos_v), (sin_h, cos_h)] = [v, h].map(|angle| angle.to_radians().sin_cos());
+        cos_v * aim + sin_v * (cos_h * up - sin_h * right)
+    };
+    let lobe = |direction: Vec3| {
+        100.0 * aim.dot(direction).max(0.0).powi(3) * (1.0 + 0.5 * right.dot(direction) + 0.3 * up.dot(direction))
+    };
+    let of_c = table(&file_of(1, &steps(0.0, 180.0, 5.0), &steps(0.0, 360.0, 5.0), |angles| lobe(wide(angles))));
+    for code in [A.code, B.code] {
+        let pose = Pose { code, aim, right, up };
+        let luminaire = pose.table(&all, &all, |angles| lobe(pose.direction(angles)));
+        for v in steps(1.0, 179.0, 7.3) {
+            for h in steps(0.0, 359.0, 7.3) {
+                let direction = wide([v, h]);
+                let found = [&luminaire, &of_c].map(|luminaire| towards_in_frame(luminaire, direction));
+                // Interpolation between these angles errs by a few thousandths of the peak.
+                assert!((found[0] - found[1]).abs() < 0.6, "{code} {v} {h}: {found:?}");
+            }
+        }
+    }
+}
+
 /// Measured from -40 to 40 degrees, a lamp is dark beyond.
 #[test]
 fn what_was_not_measured_is_dark() {
@@ -246,7 +282,7 @@ fn what_was_not_measured_is_dark() {
         for angles in [[20.1, 0.0], [-20.1, 0.0], [0.0, 40.1], [0.0, -40.1], [0.0, 180.0]] {
             assert_eq!(towards(&luminaire, pose.direction(angles)), 0.0, "{} {angles:?}", pose.code);
         }
-        let Luminaire { vertical, horizontal, intensities } = &luminaire;
+        let Luminaire { vertical, horizontal, intensities, .. } = &luminaire;
         let profile = fanlight::Profile { vertical, horizontal, intensities };
         fanlight::LightSampler::builder().add_profile(&profile).expect("a valid profile");
     }

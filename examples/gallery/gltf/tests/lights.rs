@@ -74,6 +74,19 @@ fn measured_profiles() {
     assert!(error.contains("type 4") && error.contains("node 0"), "{error}");
 }
 
+/// Lamps of types A and B are aimed along -z as well: such ones light the whole half of the room in front of them.
+#[test]
+fn profiles_of_other_types() {
+    for code in [2, 3] {
+        let header = format!("IESNA:LM-63-2002%0ATILT=NONE%0A1 -1 1 2 2 {code} 2 0 0 0%0A1 1 20%0A");
+        let uri = format!("data:application/x-ies-lm-63,{header}-90 90%0A-90 90%0A100 100 100 100%0A");
+        let mut file = with_light(&json!({ "type": "point" }));
+        file.json["extensions"] = json!({ "EXT_lights_ies": { "lights": [{ "uri": uri }] } });
+        file.json["nodes"][0]["extensions"] = json!({ "EXT_lights_ies": { "light": 0 } });
+        assert_near(brightness(&file.read().model), expected(|step| of_intensity(100.0, step)), EXACT);
+    }
+}
+
 #[test]
 fn points() {
     let read = with_light(&json!({ "type": "point", "intensity": 100, "name": "bulb" })).read();
