@@ -3,7 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::texel_cut::{self, TexelCut};
+use super::texel_cut::TexelCut;
 use crate::env::{EnvironmentView, FeatureNode, FeatureTexel};
 use crate::warp::Variate;
 
@@ -25,11 +25,11 @@ pub(super) enum Coverage {
     All,
 }
 
-/// A piece of what is visible: all below a node, or perhaps a part of a block of texels.
+/// A piece of what is visible: all below a node, or a block of texels.
 #[derive(Clone, Copy, Debug)]
 enum Piece<'a> {
     Node(usize),
-    Texel(&'a FeatureTexel),
+    Texel(&'a FeatureTexel, TexelCut),
 }
 
 impl Opening {
@@ -56,9 +56,10 @@ impl Opening {
         }
     }
 
-    /// Visits what the opening may show below a node, until `visit` returns true.
+    /// Visits what the opening shows below a node, each piece with the excess over the cap integrated over its visible
+    /// directions, until `visit` returns true.
     #[inline]
-    fn visit<'a>(&self, environment: &EnvironmentView<'a>, node: usize, mut visit: impl FnMut(Piece<'a>) -> bool) {
+    fn visit<'a>(&self, environment: &EnvironmentView<'a>, node: usize, mut visit: impl FnMut(Piece<'a>, f32) -> bool) {
         let nodes = environment.feature_nodes();
         let end = nodes[node].next as usize;
         let mut at = node;
@@ -67,16 +68,19 @@ impl Opening {
             match self.coverage(found) {
                 Coverage::Nothing => at = found.next as usize,
                 Coverage::All => {
-                    if visit(Piece::Node(at)) {
+                    if visit(Piece::Node(at), found.power) {
                         return;
                     }
                     at = found.next as usize;
                 }
                 Coverage::Part => {
-                    if environment.is_feature_leaf(at)
-                        && environment.feature_texels(at).iter().map(Piece::Texel).any(&mut visit)
-                    {
-                        return;
+                    if environment.is_feature_leaf(at) {
+                        for texel in environment.feature_texels(at) {
+                            let cut = TexelCut::new(texel, self);
+                            if visit(Piece::Texel(texel, cut), texel.power() * cut.share()) {
+                                return;
+                            }
+                        }
                     }
                     at += 1;
                 }
@@ -84,29 +88,14 @@ impl Opening {
         }
     }
 
-    /// Sums up the excess over the cap below a node, with the share of each block that `share` finds to be visible.
-    #[inline]
-    fn sum(&self, environment: &EnvironmentView<'_>, node: usize, share: impl Fn(&FeatureTexel) -> f32) -> f32 {
+    /// Returns the excess over the cap below a node, integrated over the directions of the opening.
+    pub(super) fn power(&self, environment: &EnvironmentView<'_>, node: usize) -> f32 {
         let mut sum = 0.0;
-        self.visit(environment, node, |piece| {
-            sum += match piece {
-                Piece::Node(node) => environment.feature_nodes()[node].power,
-                Piece::Texel(texel) => texel.power() * share(texel),
-            };
+        self.visit(environment, node, |_, power| {
+            sum += power;
             false
         });
         sum
-    }
-
-    /// Returns the excess over the cap below a node, integrated over the directions of the opening.
-    pub(super) fn power(&self, environment: &EnvironmentView<'_>, node: usize) -> f32 {
-        self.sum(environment, node, |texel| TexelCut::new(texel, self).share())
-    }
-
-    /// Estimates [`Self::power`] in less time. Zero only where the power is. `radius` is about that of a disk in the
-    /// opening, as a sine.
-    pub(super) fn estimate_power(&self, environment: &EnvironmentView<'_>, node: usize, radius: f32) -> f32 {
-        self.sum(environment, node, |texel| texel_cut::estimate_share(texel, self, radius))
     }
 
     /// Draws a world direction in the visible part of a node, with a density in proportion to the excess over the cap.
@@ -122,27 +111,20 @@ impl Opening {
     ) -> Vec3 {
         let target = u[1].value() * f64::from(power);
         let (mut chosen, mut low, mut width, mut below) = (None, 0.0, 1.0, 0.0);
-        self.visit(environment, node, |piece| {
-            let (cut, power) = match piece {
-                Piece::Node(node) => (TexelCut::All, environment.feature_nodes()[node].power),
-                Piece::Texel(texel) => {
-                    let cut = TexelCut::new(texel, self);
-                    (cut, texel.power() * cut.share())
-                }
-            };
+        self.visit(environment, node, |piece, power| {
             if power > 0.0 {
-                (chosen, low, width) = (Some((piece, cut)), below, f64::from(power));
+                (chosen, low, width) = (Some(piece), below, f64::from(power));
                 below += width;
             }
             target < below
         });
         u[1].stretch(target - low, width, f64::from(power));
         match chosen {
-            Some((Piece::Node(node), _)) => environment.sample_feature(node, u),
-            Some((Piece::Texel(texel), TexelCut::Part(polygon, _))) => {
+            Some(Piece::Node(node)) => environment.sample_feature(node, u),
+            Some(Piece::Texel(texel, TexelCut::Part(polygon, _))) => {
                 environment.direction_in_texel(texel, polygon.sample(u))
             }
-            Some((Piece::Texel(texel), _)) => environment.direction_in_texel(texel, u.map(|u| u.value_f32() - 0.5)),
+            Some(Piece::Texel(texel, _)) => environment.direction_in_texel(texel, u.map(|u| u.value_f32() - 0.5)),
             None => environment.sample_feature(node, u),
         }
     }

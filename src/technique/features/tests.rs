@@ -102,29 +102,6 @@ fn nothing_that_is_seen_is_left_out() {
     }
 }
 
-/// What is seen is never estimated to be nothing, and openings as wide as the sun's texels are told apart by estimates.
-#[test]
-fn estimates_follow_what_is_seen() {
-    let mut pcg = Pcg32::new(8, 41);
-    for environment in zoo(&mut pcg) {
-        let view = environment.as_view();
-        let (mut products, mut squares, mut powers) = (0.0, 0.0, 0.0);
-        for _ in 0..2000 {
-            let triangle = triangle(&view, &mut pcg);
-            let opening = Opening::new(&view, triangle);
-            let power = opening.power(&view, 0);
-            let estimate = opening.estimate_power(&view, 0, 0.5 * view.feature_nodes()[0].sin_radius);
-            assert!(estimate.is_finite() && (estimate > 0.0 || power == 0.0), "{estimate} of {power}");
-            products += power * estimate;
-            squares += estimate * estimate;
-            powers += power * power;
-        }
-        // The cosine of the angle between both as vectors.
-        let cosine = products / (squares * powers).sqrt();
-        assert!(cosine > 0.9, "{cosine}");
-    }
-}
-
 #[test]
 fn directions_into_what_is_seen() {
     let mut pcg = Pcg32::new(7, 41);

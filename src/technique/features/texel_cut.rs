@@ -11,34 +11,6 @@ use super::clipped_square::ClippedSquare;
 use super::opening::Opening;
 use crate::env::FeatureTexel;
 
-/// Radius of the disk that a texel counts as, over that of the ball around it. *Chosen*: the disk has the area of a
-/// square.
-///
-/// Larger: openings beside a feature are drawn. Smaller: noise from corners of texels.
-const DISK: f32 = 0.8;
-
-/// Least share of a texel that counts as visible where some of it may be. *Chosen*.
-///
-/// Larger: openings beside a feature are drawn. Smaller: noise from corners of texels.
-const LEAST_SHARE: f32 = 0.02;
-
-/// Estimates the visible share of a texel's area, as if it were a disk and each edge of the opening cut it for itself.
-/// Zero only where nothing is visible. `radius` is about that of a disk in the opening, as a sine: what of the texel
-/// lies beyond the opening's width counts no more.
-#[inline]
-pub(super) fn estimate_share(texel: &FeatureTexel, opening: &Opening, radius: f32) -> f32 {
-    let center = Vec3::from_array(texel.center);
-    let depths = opening.planes.map(|plane| plane.dot(center));
-    let [a, b, c] = depths;
-    if a.min(b).min(c) < -texel.radius {
-        return 0.0;
-    }
-    let disk = DISK * texel.radius;
-    let per_width = 0.5 / disk.min(radius).max(f32::MIN_POSITIVE);
-    let [a, b, c] = depths.map(|depth| ((disk + depth) * per_width).clamp(0.0, 1.0));
-    (a * b * c).max(LEAST_SHARE)
-}
-
 /// The part of a texel that is visible through an opening.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TexelCut {

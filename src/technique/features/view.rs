@@ -157,12 +157,9 @@ impl<'a> FeatureView<'a> {
     fn sample_in(&self, cell: LatticeCell, power: Option<f32>, u: [Variate; 2]) -> Option<(Lattice, f32)> {
         let opening = self.opening(cell);
         let power = power.unwrap_or_else(|| opening.power(self.environment, self.node));
-        if power <= 0.0 {
-            return None;
-        }
         let direction = opening.sample(self.environment, self.node, power, u);
         let point = self.triangle.intersect(direction).filter(|point| cell.holds(*point))?;
-        Some((point, power))
+        (power > 0.0).then_some((point, power))
     }
 
     /// Density per solid angle with which [`Self::sample`] draws a point of the part, divided by the feature's excess
@@ -192,7 +189,8 @@ impl<'a> FeatureView<'a> {
     /// between, the share grows evenly from cones that touch to one that holds the other, with a disk as wide as the
     /// feature is spread.
     fn covered_shares(&self, corners: &[Vec3; 3]) -> [f32; ARITY] {
-        let (_, radius2) = ball(corners);
+        let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
+        let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
         let extent = self.triangle.vertices().iter().fold(0.0, |extent: f32, v| extent.max(v.abs().max_element()));
         let radius = math::sqrt(radius2 * (1.0 / ARITY as f32)) + ASIDE_ROUNDING * extent;
         let (axis, sine) = (Vec3::from_array(self.bright().axis), self.bright().reach());
@@ -228,7 +226,8 @@ impl<'a> FeatureView<'a> {
 
     /// Whether a cell is small compared with the feature.
     fn is_small(&self, corners: &[Vec3; 3]) -> bool {
-        let (center, radius2) = ball(corners);
+        let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
+        let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
         let reach = SMALL_CELL * self.bright().sin_radius;
         radius2 <= reach * reach * center.length_squared()
     }
@@ -242,25 +241,12 @@ impl CellTarget for FeatureView<'_> {
     fn child(&self, (): &(), _index: usize) {}
 
     fn weigh_children(&self, at: LatticeCell, (): &(), averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
-        let corners = self.corners(at);
-        let shares = self.covered_shares(&corners);
+        let shares = self.covered_shares(&self.corners(at));
         let may_show = |i: usize| averages[i] != 0.0 && shares[i] > 0.0;
-        // The inscribed circle of an equilateral triangle has half the radius of the circumscribed one.
-        let (center, radius2) = ball(&corners);
-        let radius = 0.5 * math::sqrt(radius2 / (ARITY as f32 * center.length_squared()));
-        // An estimate is enough for the choice: the density in the chosen child rests on its exact power.
-        let power = |i| self.opening(at.child(i)).estimate_power(self.environment, self.node, radius);
-        *weights = core::array::from_fn(|i| if may_show(i) { power(i) } else { 0.0 });
+        *weights = core::array::from_fn(|i| if may_show(i) { self.power(at.child(i)) } else { 0.0 });
     }
 
     fn is_final(&self, _at: LatticeCell, (): &mut (), _levels: Option<u32>) -> bool {
         true
     }
-}
-
-/// Returns the center of a triangle and the squared radius of the ball around it that holds the triangle.
-fn ball(corners: &[Vec3; 3]) -> (Vec3, f32) {
-    let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
-    let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
-    (center, radius2)
 }
