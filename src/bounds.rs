@@ -154,6 +154,7 @@ mod tests {
             assert!((two / (2.0 * exact).min(4.0 * core::f64::consts::PI) - 1.0).abs() < 1e-4);
         }
     }
+
     #[test]
     fn four_measures_are_those_of_each() {
         for i in 0..=1000 {
