@@ -13,6 +13,10 @@ pub(crate) trait Kernel: Sized {
 
     /// Whether 512-bit vectors make it faster: measured (docs/SPEED.md, "Instruction sets"). Other code runs with 256
     /// bits, and is not compiled for more.
+    #[cfg_attr(
+        not(all(target_arch = "x86_64", feature = "std", fanlight_avx512)),
+        expect(dead_code, reason = "nothing runs with 512 bits")
+    )]
     const USES_512_BITS: bool = false;
 
     /// Runs the code. Must be `#[inline(always)]`, and so must everything in it that is to be compiled for wider
