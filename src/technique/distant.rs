@@ -40,7 +40,7 @@ impl Distant {
         if !at.is_somewhere() {
             return None;
         }
-        let irradiance = sum(&weights(at)).min(f64::from(f32::MAX)) as f32;
+        let irradiance = sum(weights(at, &mut [0.0; MOST_GROUPS])).min(f64::from(f32::MAX)) as f32;
         (irradiance > 0.0).then_some(Self { irradiance })
     }
 
@@ -51,13 +51,14 @@ impl Distant {
 
     /// Draws a direction. `None` where nothing arrives from the light or group that the variates lead to.
     pub(super) fn sample(&self, at: &Viewpoint<'_>, choice: &mut Variate, u: [Variate; 2]) -> Option<DistantDirection> {
-        let weights = weights(at);
-        let index = pick(&weights, sum(&weights), choice);
+        let mut room = [0.0; MOST_GROUPS];
+        let weights = weights(at, &mut room);
+        let index = pick(weights, sum(weights), choice);
         let group = at.scene.lights.extras().distant_groups().get(index)?;
         let light = if group.lights().len() > 1 { pick_light(at, group, choice)? } else { group.lights().start };
         let view = at.scene.lights.extras().distants().get(light)?.view(at.x.receiver);
         let direction = view.draw(u.map(|u| u.value()))?;
-        let pmf = pmf_in(at, &weights, index, light);
+        let pmf = pmf_in(at, weights, index, light);
         let pdf = pmf * view.pdf(direction);
         (pdf > 0.0).then_some(DistantDirection { light, direction, pmf, pdf })
     }
@@ -66,7 +67,7 @@ impl Distant {
     pub(super) fn pmf(&self, at: &Viewpoint<'_>, light: usize) -> f64 {
         let groups = at.scene.lights.extras().distant_groups();
         let Some(index) = groups.iter().position(|group| group.lights().contains(&light)) else { return 0.0 };
-        pmf_in(at, &weights(at), index, light)
+        pmf_in(at, weights(at, &mut [0.0; MOST_GROUPS]), index, light)
     }
 
     /// Returns the density per solid angle with which [`Self::sample`] draws a unit direction that leads to a light
@@ -82,17 +83,18 @@ impl Distant {
     }
 }
 
-/// Weights of the groups.
-fn weights(at: &Viewpoint<'_>) -> [f32; MOST_GROUPS] {
-    let (lights, mut weights) = (at.scene.lights.extras().distants(), [0.0; MOST_GROUPS]);
-    for (weight, group) in weights.iter_mut().zip(at.scene.lights.extras().distant_groups()) {
+/// Weights of the groups, as many as there are: most scenes have one distant light.
+fn weights<'w>(at: &Viewpoint<'_>, room: &'w mut [f32; MOST_GROUPS]) -> &'w [f32] {
+    let (lights, groups) = (at.scene.lights.extras().distants(), at.scene.lights.extras().distant_groups());
+    let weights = &mut room[..groups.len().min(MOST_GROUPS)];
+    for (weight, group) in weights.iter_mut().zip(groups) {
         *weight = match lights.get(group.lights()) {
             _ if group.groups & at.x.groups == 0 => 0.0,
             Some([light]) => light.weigh(at.x.receiver),
             _ => group.weigh(at.x.receiver),
         };
     }
-    keep_positive(&mut weights);
+    keep_positive(weights);
     weights
 }
 
@@ -125,8 +127,8 @@ fn pick_light(at: &Viewpoint<'_>, group: &DistantGroup, choice: &mut Variate) ->
 }
 
 /// Returns the probability of a light, by the weights of the groups and the number of its own.
-fn pmf_in(at: &Viewpoint<'_>, weights: &[f32; MOST_GROUPS], index: usize, light: usize) -> f64 {
-    let pmf = pmf(weights, index.min(MOST_GROUPS - 1));
+fn pmf_in(at: &Viewpoint<'_>, weights: &[f32], index: usize, light: usize) -> f64 {
+    let pmf = if index < weights.len() { pmf(weights, index) } else { 0.0 };
     match at.scene.lights.extras().distant_groups().get(index) {
         Some(group) if pmf > 0.0 && group.lights().len() > 1 => pmf * pmf_of_light(at, group, light),
         _ => pmf,

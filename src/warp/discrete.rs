@@ -46,7 +46,7 @@ pub(crate) fn keep_possible<const N: usize>(weights: &mut [f32; N], possible: im
 
 /// [`keep_possible`] of what is positive.
 #[inline(always)]
-pub(crate) fn keep_positive<const N: usize>(weights: &mut [f32; N]) {
+pub(crate) fn keep_positive(weights: &mut [f32]) {
     let mut largest = 0_i32;
     for weight in weights.iter_mut() {
         *weight = only_if(*weight > 0.0, within_range(*weight));
@@ -67,7 +67,7 @@ pub(crate) fn within_range(weight: f32) -> f32 {
 /// numbers are ordered as the numbers are, and the maximum of integers can be taken in any order, so that loops become
 /// vectors.
 #[inline(always)]
-pub(crate) fn keep_least<const N: usize>(weights: &mut [f32; N], largest: u32) {
+pub(crate) fn keep_least(weights: &mut [f32], largest: u32) {
     let least = LEAST_CHOICE_SHARE * f32::from_bits(largest);
     for weight in weights {
         *weight = only_if(*weight > 0.0, at_least(*weight, least));

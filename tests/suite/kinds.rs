@@ -567,7 +567,7 @@ fn black_lamps_are_never_chosen() {
 /// Relative deviation of samples as a light grows: no step.
 fn assert_gradual(what: &str, lights: impl Fn(f32) -> (LightSampler, Vec<Kind>), range: [f32; 2]) {
     let mut pcg = Pcg32::new(17, 150);
-    let steps = 100;
+    let (steps, n) = (100, tier().histogram / 5);
     let ratio = (range[1] / range[0]).powf(1.0 / steps as f32);
     let x = ShadingPoint::surface(Vec3::ZERO, Vec3::Z);
     let deviations: Vec<f64> = (0..=steps)
@@ -575,7 +575,6 @@ fn assert_gradual(what: &str, lights: impl Fn(f32) -> (LightSampler, Vec<Kind>),
             let (lights, twins) = lights(range[0] * ratio.powi(i));
             let at = lights.at(&x);
             let mut mean = Mean::default();
-            let n = 20_000;
             for _ in 0..n {
                 let sample = at.sample(pcg.cube());
                 mean.add(sample.map_or(0.0, |sample| match sample.light {
@@ -583,7 +582,7 @@ fn assert_gradual(what: &str, lights: impl Fn(f32) -> (LightSampler, Vec<Kind>),
                     _ => brought(&twins, &x, &sample),
                 }));
             }
-            mean.error() * f64::from(n).sqrt() / mean.mean()
+            mean.error() * (n as f64).sqrt() / mean.mean()
         })
         .collect();
     for (i, pair) in deviations.windows(2).enumerate() {

@@ -48,25 +48,26 @@ impl<'a> PathTracer<'a> {
     /// Light that a surface reflects to where a ray that goes in a direction came from.
     fn reflected(&self, first: Point, direction: Vec3, random: &mut Random) -> Vec3 {
         let photon = self.photons.as_ref().and_then(|photons| photons.trace(random.take()));
-        let mut x = self.vertex(first, direction, 1, None);
         let (mut radiance, mut throughput) = (Vec3::ZERO, Vec3::ONE);
+        let (mut point, mut direction, mut arrival) = (first, direction, None);
         for bounce in 1..=self.bounces {
+            let x = self.vertex(point, direction, bounce, arrival);
             radiance += throughput * self.by_light_samples(&x, random);
             if let Some(photon) = photon.as_ref().filter(|_| bounce < self.bounces) {
                 radiance += throughput * self.by_photon(&x, photon, bounce + 1);
             }
-            let Some((direction, value)) = x.scatter(random) else { break };
-            let (passed, end) = self.world.trace(x.start(direction), direction);
+            let Some((scattered, value)) = x.scatter(random) else { break };
+            let (passed, end) = self.world.trace(x.start(scattered), scattered);
             throughput *= value * passed;
-            let light = self.world.light(end.as_ref(), direction);
+            let light = self.world.light(end.as_ref(), scattered);
             if light != Vec3::ZERO && !matches!(x.lights, ChoiceAt::Single(_)) {
-                radiance += throughput * light / self.density(&x, direction, end.as_ref(), None);
+                radiance += throughput * light / self.density(&x, scattered, end.as_ref(), None);
             }
             let Some(next) = end else { break };
-            let pdf = x.pdf(direction);
+            let pdf = x.pdf(scattered);
             throughput /= pdf;
-            let arrival = pdf * next.normal.dot(direction).abs() / (next.distance * next.distance);
-            x = self.vertex(next, direction, bounce + 1, self.photons.is_some().then_some(arrival));
+            let per_area = pdf * next.normal.dot(scattered).abs() / (next.distance * next.distance);
+            (point, direction, arrival) = (next, scattered, self.photons.is_some().then_some(per_area));
         }
         radiance
     }
