@@ -2,7 +2,8 @@
 //!
 //! Where a triangle is small for its distance, what its points send to the receiver is almost a linear function of
 //! their barycentrics, given by its three corners. (Hart et al. 2020, "Practical Product Sampling by Fitting and
-//! Composing Warps", warp a square in this way.) No direction is computed, so that a sample costs next to nothing.
+//! Composing Warps", warp a square in this way.) No direction is computed, so that a sample costs next to nothing. With
+//! the least effort the density is constant, which saves the search for a root.
 
 use glam::Vec3;
 
@@ -10,9 +11,9 @@ use super::triangle_view::TriangleView;
 use super::{DrawnPoint, LightViewKind, LocalPoint};
 use crate::blas::Lattice;
 use crate::math::{at_least, sqrt};
-use crate::receiver::{Lobe, ReceiverKind, SPREAD_OF_RADIUS2, for_lobe};
+use crate::receiver::{Effort, Lobe, ReceiverKind, SPREAD_OF_RADIUS2, for_lobe};
 use crate::warp::Variate;
-use crate::warp::triangle::{linear_pdf, square_to_linear_triangle};
+use crate::warp::triangle::{linear_pdf, square_to_linear_triangle, square_to_triangle};
 
 /// Ratio of squared radius to squared distance up to which the density is linear.
 ///
@@ -28,8 +29,8 @@ const LEAST_CORNER_RATIO: f32 = 1.0 / 8.0;
 
 /// A density that is linear over the area of a triangle.
 pub(super) struct LinearDensity {
-    /// Weights of the three corners, positive.
-    corners: [f64; 3],
+    /// Weights of the three corners, positive. `None` for the same at all points: with the least effort.
+    corners: Option<[f64; 3]>,
 }
 
 impl LinearDensity {
@@ -43,17 +44,22 @@ impl LinearDensity {
         if !(view.radius2 <= LINEAR_GEOMETRY * distance2 && view.has_constant_radiance(center, distance2)) {
             return None;
         }
+        if view.effort == Effort::Least && !view.receiver.has_lobe() {
+            let height = |vertex| view.receiver.weight_at_height(view.receiver_normal.dot(vertex), 1.0);
+            return is_even(view.vertices.map(height)).then_some(Self { corners: None });
+        }
         let corners = for_lobe!(view.receiver, lobe => corners(view, lobe, center, distance2))?;
-        let [a, b, c] = corners;
-        let (least, largest) = (a.min(b).min(c), a.max(b).max(c));
-        let is_even = least > 0.0 && largest < f32::INFINITY && least >= LEAST_CORNER_RATIO * largest;
-        is_even.then(|| Self { corners: corners.map(f64::from) })
+        is_even(corners).then(|| Self { corners: Some(corners.map(f64::from)) })
     }
 
     /// Draws a point.
     #[inline]
     pub(super) fn sample(&self, view: &TriangleView<'_>, u: [Variate; 2]) -> Option<DrawnPoint> {
-        let point = Lattice::inside(square_to_linear_triangle(u.map(|u| u.value()), self.corners));
+        let u = u.map(|u| u.value());
+        let point = Lattice::inside(match self.corners {
+            Some(corners) => square_to_linear_triangle(u, corners),
+            None => square_to_triangle(u),
+        });
         let (pdf, relative) = (self.pdf(view, point)?, view.position(point));
         Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative, pdf })
     }
@@ -61,10 +67,18 @@ impl LinearDensity {
     /// Returns the density per solid angle of a point. `None` where it is not a positive number.
     #[inline]
     pub(super) fn pdf(&self, view: &TriangleView<'_>, point: Lattice) -> Option<f64> {
-        let pdf_area = linear_pdf(point.to_barycentrics().map(f64::from), self.corners) / f64::from(view.area);
+        let relative = self.corners.map_or(1.0, |corners| linear_pdf(point.to_barycentrics().map(f64::from), corners));
+        let pdf_area = relative / f64::from(view.area);
         let pdf = pdf_area / view.solid_angle_per_area(view.position(point));
         (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
     }
+}
+
+/// Whether the weights of the corners are close enough to each other.
+#[inline(always)]
+fn is_even([a, b, c]: [f32; 3]) -> bool {
+    let (least, largest) = (a.min(b).min(c), a.max(b).max(c));
+    least > 0.0 && largest < f32::INFINITY && least >= LEAST_CORNER_RATIO * largest
 }
 
 /// Weights of the corners, relative to each other; `None` where the lobe varies too much in between.
@@ -119,7 +133,7 @@ mod tests {
             let value = sent(v0 * (1.0 - b1 - b2) + v1 * b1 + v2 * b2);
             sum += value;
             uniform += value * value;
-            linear += value * value / linear_pdf([b1, b2], density.corners);
+            linear += value * value / linear_pdf([b1, b2], density.corners.expect("full effort"));
         }
         let count = (SIDE * SIDE) as f64;
         Some([uniform, linear].map(|squares| count * squares / (sum * sum) - 1.0))

@@ -79,7 +79,7 @@ pub(crate) struct TriangleView<'a> {
     pub(super) illumination: Illumination,
     /// What the triangle is a portal to, if that depends on the direction.
     pub(super) environment: Option<&'a EnvironmentView<'a>>,
-    effort: Effort,
+    pub(crate) effort: Effort,
     /// The tree over the texture.
     pub(crate) root: Root,
     /// Nodes of the trees over textures.

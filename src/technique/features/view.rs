@@ -7,6 +7,7 @@ use crate::blas::{self, ARITY, CHILD_CENTERS, CellTarget, Draw, Follow, LEAF, La
 use crate::env::{EnvironmentView, FeatureNode};
 use crate::light::TriangleView;
 use crate::math;
+use crate::receiver::Effort;
 use crate::warp::Variate;
 
 /// Ratio of a cell's to a feature's angular radius up to which the cell counts as one part, however its texture
@@ -18,6 +19,12 @@ use crate::warp::Variate;
 /// children as wide as the feature, whose mean says less of what it shines through. Smaller: up to 64 times as many
 /// parts, of which the list holds [`MAX_VISIBLE`](super::list::MAX_VISIBLE).
 const SMALL_CELL: f32 = 4.0;
+
+/// The same with the least effort, where texels of a part are not followed: points are drawn in all of it by the feature
+/// alone. *Measured* (docs/CONSTANTS.md).
+///
+/// Larger: a shading point costs less, and opaque texels waste more samples. Smaller: the other way round.
+const LEAST_SMALL_CELL: f32 = 16.0;
 
 /// Rounding of a cell's corners relative to the largest coordinate of a vertex. Proved: a corner is a sum of three
 /// products, each off by less than 2e-7; the rest is for the axis and the products with it.
@@ -114,7 +121,8 @@ impl<'a> FeatureView<'a> {
             let average = scale * self.average_before_feature(&corners, below.node);
             let power = opening.power(self.environment, self.node);
             if power * average > 0.0 {
-                found(FeaturePart { cell, node: below.node, power }, power * average);
+                let node = if self.follows_texels() { below.node } else { LEAF };
+                found(FeaturePart { cell, node, power }, power * average);
             }
             return;
         }
@@ -215,6 +223,12 @@ impl<'a> FeatureView<'a> {
         shares
     }
 
+    /// Whether points in a part are drawn by its texels as well.
+    #[inline]
+    fn follows_texels(&self) -> bool {
+        self.triangle.effort != Effort::Least
+    }
+
     /// Corners of a cell, relative to the shading point.
     fn corners(&self, cell: LatticeCell) -> [Vec3; 3] {
         let &[v0, v1, v2] = self.triangle.vertices();
@@ -228,7 +242,7 @@ impl<'a> FeatureView<'a> {
     fn is_small(&self, corners: &[Vec3; 3]) -> bool {
         let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
         let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
-        let reach = SMALL_CELL * self.bright().sin_radius;
+        let reach = if self.follows_texels() { SMALL_CELL } else { LEAST_SMALL_CELL } * self.bright().sin_radius;
         radius2 <= reach * reach * center.length_squared()
     }
 }
