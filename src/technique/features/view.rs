@@ -49,7 +49,7 @@ const LEAST_SHARE: f32 = 0.05;
 pub(super) struct FeaturePart {
     /// Cell of the triangle.
     pub(super) cell: LatticeCell,
-    /// Node of the texture's tree below the cell.
+    /// Node of the texture's tree below the cell; [`LEAF`] where points are drawn without regard to texels.
     node: u32,
     /// Power of the feature through the cell, as if the texture were one.
     power: f32,
