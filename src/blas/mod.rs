@@ -14,7 +14,7 @@ mod node;
 mod validate;
 mod walk;
 
-pub(crate) use barycentric::{ARITY, Lattice, LatticeCell};
+pub(crate) use barycentric::{ARITY, EDGE_CELLS, Lattice, LatticeCell};
 pub(crate) use build::{ImageTree, RegisteredFunction, build_images, build_procedural, check_uv, image_work};
 pub use build::{Procedural, Texture};
 #[cfg(test)]
@@ -22,5 +22,5 @@ pub(crate) use build::{TexturePyramid, build};
 pub(crate) use node::{CellNode, LEAF, MAX_AVERAGE, Root, averages, below, holds, mean, places, storable};
 pub(crate) use validate::{validate, validate_roots};
 pub(crate) use walk::{
-    CHILD_CENTERS, CellTarget, Draw, Follow, Guide, child_corners, child_values, descend, descend_below,
+    CHILD_CENTERS, CHILD_STRIPS, CellTarget, Draw, Follow, Guide, child_corners, child_values, descend, descend_below,
 };

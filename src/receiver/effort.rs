@@ -9,10 +9,10 @@ pub enum Effort {
     /// Follows all that is known: inside a light the receiver and, through a portal, the environment.
     #[default]
     Full,
-    /// Chooses a light as [`Full`](Self::Full) does, and follows bright features of the environment, but for the texels
-    /// that they shine through. Inside a light, nothing of the environment behind it is followed: directions to a
-    /// triangle without a texture are uniform, or points by area where it is small for its distance, and of a texture
-    /// the texels are followed.
+    /// Chooses a light as [`Full`](Self::Full) does, and follows bright features of the environment, through larger
+    /// parts of a texture at a time. Inside a light, nothing else of the environment behind it is followed: directions
+    /// to a triangle without a texture are uniform, or points by area where it is small for its distance, and of a
+    /// texture the texels are followed.
     ///
     /// What it saves depends on what a call does there: through two windows to an image of the sky it takes a quarter of
     /// the time, and where dozens of openings or bright features are to choose among four fifths; among emitters it saves

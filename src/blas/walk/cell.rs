@@ -32,6 +32,19 @@ pub(crate) static CHILD_CENTERS: ChildCenters = {
     centers
 };
 
+/// For each child, the strips that it fills along the axes: its barycentrics times [`EDGE_CELLS`] lie between these
+/// numbers and one more.
+pub(crate) static CHILD_STRIPS: [[u8; 3]; ARITY] = {
+    let mut strips = [[0; 3]; ARITY];
+    let mut index = 0;
+    while index < ARITY {
+        let [a0, a1, a2] = POSITIONS[index].a;
+        strips[index] = [a0 as u8, a1 as u8, a2 as u8];
+        index += 1;
+    }
+    strips
+};
+
 /// Barycentrics of the children's corners in the cell, by child and corner.
 static CORNER_WEIGHTS: [[[f32; 3]; 3]; ARITY] = {
     let mut weights = [[[0.0; 3]; 3]; ARITY];

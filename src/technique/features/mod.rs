@@ -4,6 +4,7 @@
 //! shows. The irradiance from the features is then known. As a direction towards a feature belongs to a point of a
 //! portal, like those of the trees, the density of a direction is a plain sum over the portals that it crosses.
 
+mod child_powers;
 mod clipped_square;
 mod groups;
 mod list;

@@ -56,6 +56,12 @@ impl Opening {
         }
     }
 
+    /// Whether any of a block of texels may be visible.
+    #[inline]
+    pub(super) fn meets(&self, texel: &FeatureTexel) -> bool {
+        self.planes.iter().all(|plane| plane.dot(Vec3::from_array(texel.center)) >= -texel.radius)
+    }
+
     /// Visits what the opening shows below a node, each piece with the excess over the cap integrated over its visible
     /// directions, until `visit` returns true.
     #[inline]

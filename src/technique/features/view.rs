@@ -2,12 +2,14 @@
 
 use glam::Vec3;
 
+use super::child_powers::ChildPowers;
 use super::opening::{Coverage, Opening};
 use crate::blas::{self, ARITY, CHILD_CENTERS, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{EnvironmentView, FeatureNode};
 use crate::light::TriangleView;
-use crate::math;
+use crate::math::{self, at_least, only_if};
 use crate::receiver::Effort;
+use crate::simd::InstructionSet;
 use crate::warp::Variate;
 
 /// Ratio of a cell's to a feature's angular radius up to which the cell counts as one part, however its texture
@@ -20,10 +22,10 @@ use crate::warp::Variate;
 /// parts, of which the list holds [`MAX_VISIBLE`](super::list::MAX_VISIBLE).
 const SMALL_CELL: f32 = 4.0;
 
-/// The same with the least effort, where texels of a part are not followed: points are drawn in all of it by the feature
-/// alone. *Measured* (docs/CONSTANTS.md).
+/// The same with the least effort. *Measured* (docs/CONSTANTS.md).
 ///
-/// Larger: a shading point costs less, and opaque texels waste more samples. Smaller: the other way round.
+/// Larger: a shading point costs less, and the means say less of what the feature shines through. Smaller: the other way
+/// round.
 const LEAST_SMALL_CELL: f32 = 16.0;
 
 /// Rounding of a cell's corners relative to the largest coordinate of a vertex. Proved: a corner is a sum of three
@@ -44,12 +46,18 @@ const SQUARE_ROUNDING: f32 = 3e-6;
 /// listed with next to no weight.
 const LEAST_SHARE: f32 = 0.05;
 
+/// Least power that is estimated of a child through which the feature may be visible, relative to the largest one.
+/// *Chosen*: what the estimate misses is a corner of a child or of a block.
+///
+/// Larger: more samples of children that show nothing. Smaller: what is missed is sampled seldom.
+const LEAST_POWER: f32 = 0.003;
+
 /// A part of a triangle through which a feature is visible.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeaturePart {
     /// Cell of the triangle.
     pub(super) cell: LatticeCell,
-    /// Node of the texture's tree below the cell; [`LEAF`] where points are drawn without regard to texels.
+    /// Node of the texture's tree below the cell.
     node: u32,
     /// Power of the feature through the cell, as if the texture were one.
     power: f32,
@@ -121,8 +129,7 @@ impl<'a> FeatureView<'a> {
             let average = scale * self.average_before_feature(&corners, below.node);
             let power = opening.power(self.environment, self.node);
             if power * average > 0.0 {
-                let node = if self.follows_texels() { below.node } else { LEAF };
-                found(FeaturePart { cell, node, power }, power * average);
+                found(FeaturePart { cell, node: below.node, power }, power * average);
             }
             return;
         }
@@ -223,12 +230,6 @@ impl<'a> FeatureView<'a> {
         shares
     }
 
-    /// Whether points in a part are drawn by its texels as well.
-    #[inline]
-    fn follows_texels(&self) -> bool {
-        self.triangle.effort != Effort::Least
-    }
-
     /// Corners of a cell, relative to the shading point.
     fn corners(&self, cell: LatticeCell) -> [Vec3; 3] {
         let &[v0, v1, v2] = self.triangle.vertices();
@@ -242,7 +243,8 @@ impl<'a> FeatureView<'a> {
     fn is_small(&self, corners: &[Vec3; 3]) -> bool {
         let center = corners.iter().sum::<Vec3>() * (1.0 / 3.0);
         let radius2 = corners.iter().fold(0.0, |r: f32, v| r.max((*v - center).length_squared()));
-        let reach = if self.follows_texels() { SMALL_CELL } else { LEAST_SMALL_CELL } * self.bright().sin_radius;
+        let small = if self.triangle.effort == Effort::Least { LEAST_SMALL_CELL } else { SMALL_CELL };
+        let reach = small * self.bright().sin_radius;
         radius2 <= reach * reach * center.length_squared()
     }
 }
@@ -256,8 +258,14 @@ impl CellTarget for FeatureView<'_> {
 
     fn weigh_children(&self, at: LatticeCell, (): &(), averages: &[f32; ARITY], weights: &mut [f32; ARITY]) {
         let shares = self.covered_shares(&self.corners(at));
-        let may_show = |i: usize| averages[i] != 0.0 && shares[i] > 0.0;
-        *weights = core::array::from_fn(|i| if may_show(i) { self.power(at.child(i)) } else { 0.0 });
+        let corners = at.corners().map(|corner| self.triangle.position(corner));
+        let powers = InstructionSet::best().run(ChildPowers::new(self.environment, self.node, corners));
+        // NaN is passed over.
+        let most = powers.iter().fold(f32::MIN_POSITIVE, |most, power| at_least(*power, most));
+        for (i, weight) in weights.iter_mut().enumerate() {
+            let least = LEAST_POWER * shares[i] * most;
+            *weight = only_if(averages[i] != 0.0 && shares[i] > 0.0, at_least(powers[i], least));
+        }
     }
 
     fn is_final(&self, _at: LatticeCell, (): &mut (), _levels: Option<u32>) -> bool {
