@@ -16,7 +16,7 @@ Usage: cargo run --release -p fanlight-gallery -- NAME | all | contact | FILE.gl
   NAME             room, car, lantern, letters, pinhole, facade, nested, neon, fog, street, town or glossy
   all              all of them, and a contact sheet
   contact          the contact sheet alone, of the pictures that are in the folder
-  FILE             a glTF scene; --bounces, --env and --size say what it does not
+  FILE             a glTF scene; --bounces, --camera, --env and --size say what it does not
   export DIR       writes all built-in scenes as glTF
 
 Options:

@@ -3,6 +3,7 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
+use fanlight_gallery::plain::Outside;
 use lexopt::prelude::*;
 
 use crate::Error;
@@ -11,6 +12,9 @@ const USAGE: &str = "\
 cargo bench -p fanlight-host --bench host -- [OPTIONS]
 
   --scene NAME    only this scene; may be repeated
+  --file PATH     a glTF file in place of the scenes; may be repeated
+  --env FILE      what lights files from outside: a .hdr or .exr image, or `none` (a clear sky with a sun)
+  --panes PREFIX  materials of files whose names start with this let light through, as openings
   --bounces N     only this number of surfaces that light touches (1 and 5 without it); may be repeated
   --seeds N       images of each method (8; 4 with --quick)
   --seconds S     CPU time of each image (3; 0.1 with --quick)
@@ -27,6 +31,9 @@ cargo bench -p fanlight-host --bench host -- [OPTIONS]
 #[derive(Clone, Debug)]
 pub(crate) struct Args {
     pub(crate) scenes: Vec<String>,
+    pub(crate) files: Vec<PathBuf>,
+    pub(crate) environment: Option<PathBuf>,
+    pub(crate) panes: Option<String>,
     pub(crate) bounces: Vec<u32>,
     pub(crate) seeds: u32,
     /// CPU time of an image.
@@ -49,6 +56,9 @@ impl Args {
         let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let mut args = Self {
             scenes: Vec::new(),
+            files: Vec::new(),
+            environment: None,
+            panes: None,
             bounces: Vec::new(),
             seeds: 0,
             seconds: 0.0,
@@ -65,6 +75,9 @@ impl Args {
         while let Some(word) = parser.next()? {
             match word {
                 Long("scene") => args.scenes.push(parser.value()?.string()?),
+                Long("file") => args.files.push(parser.value()?.into()),
+                Long("env") => args.environment = Some(parser.value()?.into()),
+                Long("panes") => args.panes = Some(parser.value()?.string()?),
                 Long("bounces") => args.bounces.push(parser.value()?.parse()?),
                 Long("seeds") => seeds = Some(parser.value()?.parse()?),
                 Long("seconds") => seconds = Some(parser.value()?.parse()?),
@@ -99,5 +112,14 @@ impl Args {
             return Err(format!("all numbers have to be positive\n\n{USAGE}").into());
         }
         Ok(Some(args))
+    }
+
+    /// Returns what lights files from outside.
+    pub(crate) fn outside(&self) -> Outside<'_> {
+        match &self.environment {
+            None => Outside::Daylight,
+            Some(path) if path.as_os_str() == "none" => Outside::Dark,
+            Some(path) => Outside::Image(path),
+        }
     }
 }

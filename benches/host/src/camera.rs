@@ -24,6 +24,12 @@ impl Camera {
         Self { position, axes, half_width: (0.5 * field_of_view.to_radians()).tan() }
     }
 
+    /// Returns a camera with these axes, which see as far up and down as this vertical field of view in radians.
+    pub(crate) fn with_axes(position: Vec3, axes: Mat3, field_of_view: f32) -> Self {
+        let [width, height] = RESOLUTION.map(|n| n as f32);
+        Self { position, axes, half_width: (0.5 * field_of_view).tan() * width / height }
+    }
+
     /// Returns the start and the unit direction of the ray through a point of the image, in pixels from the upper left
     /// corner.
     pub(crate) fn ray(&self, point: Vec2) -> (Vec3, Vec3) {

@@ -24,8 +24,10 @@ mod statistics;
 mod validate;
 mod world;
 
+use std::path::Path;
+
 use args::Args;
-use report::{Report, Row};
+use report::Report;
 use scene::{Data, ENTRIES, Entry};
 use world::World;
 
@@ -46,7 +48,7 @@ pub fn run() -> Result<bool, Error> {
     let mut report = Report::new(&args);
     let mut all_is_well = true;
     let is_wanted = |entry: &&Entry| match args.scenes.as_slice() {
-        [] => !args.quick || entry.quick,
+        [] => args.files.is_empty() && (!args.quick || entry.quick),
         names => names.iter().any(|name| name == entry.name),
     };
     for entry in ENTRIES.iter().filter(is_wanted) {
@@ -54,22 +56,42 @@ pub fn run() -> Result<bool, Error> {
             report.skip(entry.name, &file);
             continue;
         }
-        let world = World::new((entry.build)(&data)?);
-        for &bounces in &args.bounces {
-            if args.validate {
-                if let Some(reference) = data.reference(entry.name, bounces)? {
-                    all_is_well &= validate::validate(entry.name, &world, bounces, &reference, &args)?;
-                }
-            } else {
-                let reference = match data.reference(entry.name, bounces)? {
-                    Some(reference) => reference,
-                    None => reference::compute(entry.name, &world, bounces, &args)?,
-                };
-                let rows: Vec<Row> = measure::measure(entry.name, &world, bounces, &reference, &args)?;
-                report.add(rows);
-            }
-        }
+        all_is_well &= compare(entry.name, &World::new((entry.build)(&data)?), &data, &args, &mut report)?;
+    }
+    for path in &args.files {
+        let name = name_of(path);
+        let scene = scene::read(path, args.panes.as_deref(), args.outside())?;
+        all_is_well &= compare(&name, &World::new(scene), &data, &args, &mut report)?;
     }
     report.finish()?;
+    Ok(all_is_well)
+}
+
+/// Returns what a file is called in the figures: many are called `scene`, and their folders say more.
+fn name_of(path: &Path) -> String {
+    let parent = || path.parent().and_then(Path::file_name);
+    let name = path.file_stem().filter(|name| *name != "scene").or_else(parent);
+    name.map_or_else(|| "scene".to_owned(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Measures a scene, or compares it with the references of another renderer. Returns whether all is well.
+fn compare(name: &str, world: &World, data: &Data, args: &Args, report: &mut Report) -> Result<bool, Error> {
+    let mut all_is_well = true;
+    for &bounces in &args.bounces {
+        if args.validate {
+            if let Some(reference) = data.reference(name, bounces)? {
+                all_is_well &= validate::validate(name, world, bounces, &reference, args)?;
+            }
+        } else {
+            let reference = match data.reference(name, bounces)? {
+                Some(reference) => reference,
+                None => reference::compute(name, world, bounces, args)?,
+            };
+            if reference.noise().is_nan() {
+                return Err(format!("{name}: what the camera sees reflects no light").into());
+            }
+            report.add(measure::measure(name, world, bounces, &reference, args)?);
+        }
+    }
     Ok(all_is_well)
 }

@@ -273,10 +273,7 @@ impl Reader<'_> {
         let cameras = self.hierarchy.visible.iter().filter_map(|&node| Some((node, nodes[node].camera?)));
         let cameras: Vec<_> = cameras.collect();
         let Some(&(node, index)) = cameras.first() else {
-            self.notes.add(
-                "the scene has no camera; looking from a corner of it to its middle (`--camera` sets another one)"
-                    .to_owned(),
-            );
+            self.notes.add("the scene has no camera; looking from a corner of it to its middle".to_owned());
             self.model.camera = Camera::looking(low.lerp(high, 0.95), low.lerp(high, 0.45), 60.0);
             self.contents.push("camera: none".to_owned());
             return Ok(());

@@ -8,6 +8,7 @@ mod dome;
 mod lamps;
 mod night;
 mod room;
+mod scene_file;
 mod skies;
 mod star;
 mod street;
@@ -25,6 +26,7 @@ use crate::sky::Sky;
 
 pub(crate) use catalogue::{ENTRIES, Entry};
 pub(crate) use data::Data;
+pub(crate) use scene_file::read;
 pub(crate) use texture::Texture;
 
 /// Radiance of an emitter, the same in all channels.
