@@ -39,6 +39,8 @@ type Error = Box<dyn core::error::Error + Send + Sync>;
 ///
 /// If the command line is not understood, a file cannot be read or written, or a scene is refused by the crate.
 pub fn run() -> Result<bool, Error> {
+    // Paths on the command line are relative to the root of the repository, wherever cargo starts a benchmark.
+    std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
     let Some(args) = Args::parse()? else { return Ok(true) };
     if let Some(unknown) = args.scenes.iter().find(|name| ENTRIES.iter().all(|entry| entry.name != **name)) {
         let names: Vec<_> = ENTRIES.iter().map(|entry| entry.name).collect();
