@@ -22,8 +22,8 @@ const EDGE: usize = EDGE_CELLS as usize;
 /// more time.
 const SMALL_NODE: f32 = 0.5;
 
-/// Least half of a block's extent, in children. *Proved*: coordinates up to the number of strips are off by less than
-/// 1e-4 of a child, as long as a child spans 1e-5 radians.
+/// Least half of a block's extent, in children. *Chosen*: coordinates along an edge are rounded by less than a tenth of
+/// it where a child spans more than 1e-3 radians. Narrower children are smaller than any block.
 ///
 /// Larger: blocks between two children count for both. Smaller: rounding decides which child has a small block.
 const LEAST_EXTENT: f32 = 1e-3;
