@@ -28,6 +28,12 @@ const SMALL_NODE: f32 = 0.5;
 /// Larger: blocks between two children count for both. Smaller: rounding decides which child has a small block.
 const LEAST_EXTENT: f32 = 1e-3;
 
+/// Least power that is estimated of a child through which the feature may be visible, relative to the largest one.
+/// *Chosen*: what the estimate misses is a corner of a child or of a block.
+///
+/// Larger: more samples of children that show nothing. Smaller: what is missed is sampled seldom.
+pub(super) const LEAST_POWER: f32 = 0.003;
+
 /// The cell whose children are weighed, and the feature.
 pub(super) struct ChildPowers<'a> {
     environment: &'a EnvironmentView<'a>,
@@ -225,7 +231,7 @@ mod tests {
                 let block = block(place, [size * cos, size * sin], [-0.7 * size * sin, size * cos]);
                 let mut estimate = [0.0; ARITY];
                 block.add(&mut estimate);
-                let least = 0.003 * estimate.iter().fold(0.0, |most: f32, power| most.max(*power));
+                let least = LEAST_POWER * estimate.iter().fold(0.0, |most: f32, power| most.max(*power));
                 let exact = by_points(&block);
                 let sum: f32 = exact.iter().sum();
                 let weights = estimate.map(|power| power.max(least));

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::child_powers::ChildPowers;
+use super::child_powers::{ChildPowers, LEAST_POWER};
 use super::opening::{Coverage, Opening};
 use crate::blas::{self, ARITY, CHILD_CENTERS, CellTarget, Draw, Follow, LEAF, Lattice, LatticeCell, Root};
 use crate::env::{EnvironmentView, FeatureNode};
@@ -45,12 +45,6 @@ const SQUARE_ROUNDING: f32 = 3e-6;
 /// Larger: openings beside the feature count. Smaller: one that shows the feature's edge, and nothing else does, is
 /// listed with next to no weight.
 const LEAST_SHARE: f32 = 0.05;
-
-/// Least power that is estimated of a child through which the feature may be visible, relative to the largest one.
-/// *Chosen*: what the estimate misses is a corner of a child or of a block.
-///
-/// Larger: more samples of children that show nothing. Smaller: what is missed is sampled seldom.
-const LEAST_POWER: f32 = 0.003;
 
 /// A part of a triangle through which a feature is visible.
 #[derive(Clone, Copy, Debug)]
