@@ -109,7 +109,7 @@ pub enum Outside<'a> {
 }
 
 /// Reads a glTF file. Materials whose names start with `window`, in capitals or not, are portals where they let light
-/// through; those whose names start with `panes`, if given, do so whatever the file says.
+/// through. If `panes` is given, those whose names start with it are portals instead, whatever the file says.
 ///
 /// # Errors
 ///
@@ -120,7 +120,7 @@ pub fn read(path: &Path, panes: Option<&str>, outside: Outside<'_>) -> Result<Pl
         Outside::Image(path) => Some(Sky::new(read_rgb(path)?)),
         Outside::Dark => None,
     };
-    let prefixes = Prefixes { portals: "window", panes };
+    let prefixes = Prefixes { portals: panes.unwrap_or("window"), panes };
     let read = || gltf::read(&std::fs::read(path)?, path.parent(), prefixes, sky, gltf::Limits::RENDERABLE);
     let Read { model, notes, .. } = read().map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     if model.camera.parallel.is_some() {
@@ -154,7 +154,7 @@ impl PlainScene {
             if material.masked || material.color_map.is_some() {
                 note("the opening counts as clear everywhere");
             }
-            self.meshes.push(plain_mesh(mesh, mesh.indices.clone(), Vec::new(), PlainSurface::Portal));
+            self.meshes.push(plain_mesh(mesh, Vec::new(), PlainSurface::Portal));
             return;
         }
         let (shining, rest): (Vec<_>, Vec<_>) =
@@ -164,8 +164,9 @@ impl PlainScene {
                 note("it shines from its front alone");
             }
             note("what shines reflects no light");
-            let (surface, uvs) = emitter(model, material, mesh, &mut note);
-            self.meshes.push(plain_mesh(mesh, shining, uvs, surface));
+            let shining = Mesh { indices: shining, ..mesh.clone() };
+            let (surface, uvs) = emitter(model, material, &shining, &mut note);
+            self.meshes.push(plain_mesh(&shining, uvs, surface));
         }
         if rest.is_empty() {
             return;
@@ -176,13 +177,14 @@ impl PlainScene {
         if material.has_holes() {
             note("holes of its image are closed");
         }
-        let surface = reflecting(model, material, mesh, &mut note);
-        self.meshes.push(plain_mesh(mesh, rest, Vec::new(), surface));
+        let rest = Mesh { indices: rest, ..mesh.clone() };
+        let surface = reflecting(model, material, &rest, &mut note);
+        self.meshes.push(plain_mesh(&rest, Vec::new(), surface));
     }
 }
 
-fn plain_mesh(mesh: &Mesh, indices: Vec<[u32; 3]>, uvs: Vec<Vec2>, surface: PlainSurface) -> PlainMesh {
-    PlainMesh { positions: mesh.positions.clone(), uvs, indices, surface }
+fn plain_mesh(mesh: &Mesh, uvs: Vec<Vec2>, surface: PlainSurface) -> PlainMesh {
+    PlainMesh { positions: mesh.positions.clone(), uvs, indices: mesh.indices.clone(), surface }
 }
 
 /// Whether a triangle shines anywhere, as far as a grid of its points tells.
@@ -283,10 +285,13 @@ mod tests {
         }
         let folder = std::env::temp_dir().join(format!("fanlight-plain-{}", std::process::id()));
         let path = gltf::write(&folder, "plain", &model).expect("the folder can be written");
+        let flagged = read(&path, Some("pane"), Outside::Dark).expect("the file is sound");
         let read = read(&path, None, Outside::Dark).expect("the file is sound");
         std::fs::remove_dir_all(&folder).expect("the folder is there");
 
         let height = |mesh: &PlainMesh| mesh.positions[mesh.indices[0][0] as usize].y as u32;
+        let openings = flagged.meshes.iter().filter(|mesh| matches!(mesh.surface, PlainSurface::Portal));
+        assert_eq!(openings.map(height).collect::<Vec<_>>(), [3]);
         let at = |y: u32| read.meshes.iter().find(|mesh| height(mesh) == y).map(|mesh| &mesh.surface);
         let is_near = |a: f32, b: f32| (a - b).abs() < 0.01;
         assert!(

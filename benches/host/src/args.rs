@@ -14,7 +14,7 @@ cargo bench -p fanlight-host --bench host -- [OPTIONS]
   --scene NAME    only this scene; may be repeated
   --file PATH     a glTF file in place of the scenes; may be repeated
   --env FILE      what lights files from outside: a .hdr or .exr image, or `none` (a clear sky with a sun)
-  --panes PREFIX  materials of files whose names start with this let light through, as openings
+  --panes PREFIX  materials of files whose names start with this are openings, in place of those called `window`
   --bounces N     only this number of surfaces that light touches (1 and 5 without it); may be repeated
   --seeds N       images of each method (8; 4 with --quick)
   --seconds S     CPU time of each image (3; 0.1 with --quick)
