@@ -164,6 +164,19 @@ fn environment(criterion: &mut Criterion) {
     group.bench_function("pdf", |b| in_circle(b, POINTS, |i| sky.pdf(directions[i])));
     group.bench_function("sample", |b| in_circle(b, POINTS, |i| sky.sample([numbers[i][0], numbers[i][1]])));
     group.finish();
+    // As a light of the mixture, on surfaces that look all ways.
+    let lights = LightSampler::builder().environment(sky).environment_as_light().build().expect("the sky is a light");
+    let points: Vec<_> = (0..POINTS).map(|_| ShadingPoint::surface(Vec3::ZERO, pcg.direction())).collect();
+    let mut group = criterion.benchmark_group("environment-light");
+    group.bench_function("sample", |b| in_circle(b, POINTS, |i| lights.at(&points[i]).sample(numbers[i])));
+    group.bench_function("pdf", |b| in_circle(b, POINTS, |i| lights.at(&points[i]).pdf_environment(directions[i])));
+    group.bench_function("pair", |b| {
+        in_circle(b, POINTS, |i| {
+            let here = lights.at(&points[i]);
+            (here.sample(numbers[i]), here.pdf_environment(directions[i]))
+        });
+    });
+    group.finish();
 }
 
 fn main() {

@@ -1,11 +1,11 @@
 //! Sampling a direction of the environment in proportion to its radiance, and the density of that.
 
-use super::pyramid::children;
+use super::pyramid::{children, grandchildren};
 use super::rotation::to_world;
 use super::view::EnvironmentView;
 use crate::warp::equal_area::{SPHERE, square_to_sphere};
-use crate::warp::pick_pair;
 use crate::warp::variate::{Variate, seed};
+use crate::warp::{pick_pair, pick_wide};
 use glam::{Vec2, Vec3};
 
 /// Least distance of a sample from its texel's edge, in units of the square. *Proved*: twice what the way to the
@@ -31,8 +31,8 @@ impl EnvironmentView<'_> {
     /// Draws a direction with a density in proportion to its radiance. `None` if the environment is black.
     ///
     /// `u` holds two uniform numbers in `[0, 1)`. A stratified set of them gives a stratified set of directions:
-    /// at each level of the pyramid the second number chooses the row and the first one the column (two-dimensional
-    /// hierarchical warp, Clarberg et al. 2005, "Wavelet Importance Sampling").
+    /// at every second level of the pyramid the second number chooses a row of four texels and the first one a texel of
+    /// the row (two-dimensional hierarchical warp, Clarberg et al. 2005, "Wavelet Importance Sampling").
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
         if self.header.mean <= 0.0 {
@@ -47,10 +47,16 @@ impl EnvironmentView<'_> {
     /// [`sample`](Self::sample), not given the texel. The level may be below the finest, where directions are uniform.
     #[inline]
     pub(crate) fn sample_below(&self, level: u32, [mut x, mut y]: [u32; 2], u: &mut [Variate; 2]) -> EnvironmentSample {
-        for level in level..self.header.depth {
-            [x, y] = step(children(self.means, level, x, y), [x, y], u);
-        }
         let depth = self.header.depth.max(level);
+        let mut level = level;
+        if (depth - level) % 2 == 1 {
+            [x, y] = step(children(self.means, level, x, y), [x, y], u);
+            level += 1;
+        }
+        while level < depth {
+            [x, y] = step_twice(&grandchildren(self.means, level, x, y), [x, y], u);
+            level += 2;
+        }
         let point = Vec2::new(inside(depth, x, u[0].value_f32()), inside(depth, y, u[1].value_f32()));
         let direction = to_world(&self.header.rotation, square_to_sphere(point));
         let radiance = self.mean_in(depth, [x, y]);
@@ -65,8 +71,8 @@ impl EnvironmentView<'_> {
 
     /// Density of the directions of a texel with this radiance.
     ///
-    /// The choices of the descent telescope: the product of `child / (sum of four children)` over the levels is
-    /// the texel's share of the whole, as every mean is a quarter of that sum.
+    /// The choices of the descent telescope: the product of `child / (sum of all children)` over the levels is
+    /// the texel's share of the whole, as every mean is a quarter of the sum of four, and a sixteenth of that of 16.
     #[inline]
     fn pdf_of(&self, radiance: f32) -> f32 {
         radiance / (self.header.mean * SPHERE)
@@ -88,4 +94,15 @@ pub(crate) fn step([a, b, c, d]: [f32; 4], [x, y]: [u32; 2], u: &mut [Variate; 2
     let j = pick_pair([a + b, c + d], &mut u[1]);
     let i = pick_pair([[a, b], [c, d]][j], &mut u[0]);
     [2 * x + i as u32, 2 * y + j as u32]
+}
+
+/// Chooses one of the 16 texels two levels below a texel in proportion to their weights: the second variate the row, the
+/// first one the texel of the row. Half as many choices depend on each other as in two [`step`]s, and what the second
+/// level holds is read while the first is decided.
+#[inline(always)]
+pub(crate) fn step_twice(rows: &[[f32; 4]; 4], [x, y]: [u32; 2], u: &mut [Variate; 2]) -> [u32; 2] {
+    let sums = rows.map(|[a, b, c, d]| (a + b) + (c + d));
+    let row = pick_wide(&sums, &mut u[1]).map_or(0, |(row, _)| row);
+    let column = pick_wide(&rows[row], &mut u[0]).map_or(0, |(column, _)| column);
+    [4 * x + column as u32, 4 * y + row as u32]
 }

@@ -129,6 +129,17 @@ pub(super) fn children<T: Copy>(levels: &[T], d: u32, x: u32, y: u32) -> [T; 4] 
     children_in(&levels[level_start(d + 1)..], d, x, y)
 }
 
+/// The 16 texels two levels below a texel of depth `d`, by rows.
+#[inline(always)]
+pub(super) fn grandchildren(levels: &[f32], d: u32, x: u32, y: u32) -> [[f32; 4]; 4] {
+    let level = &levels[level_start(d + 2)..];
+    let start = ((y << (d + 4)) | (x << 2)) as usize;
+    core::array::from_fn(|row| {
+        let row = &level[start + (row << (d + 2))..][..4];
+        [row[0], row[1], row[2], row[3]]
+    })
+}
+
 /// Mean of four means, rounded once.
 #[inline]
 pub(super) fn parent_mean(children: [f32; 4]) -> f32 {

@@ -10,12 +10,12 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 use super::MAX_RADIANCE;
-use super::pyramid::level_start;
 use super::rotation::to_local;
 use super::view::{EnvironmentView, texel_at};
 use crate::error::Error;
 use crate::math;
 use crate::warp::equal_area::{SPHERE, sphere_to_square, square_to_sphere};
+use crate::warp::{Variate, pick_wide};
 
 /// Base-2 logarithm of the number of regions a side. *Format*: the arrays of [`RegionMoments`] have this length.
 ///
@@ -23,8 +23,11 @@ use crate::warp::equal_area::{SPHERE, sphere_to_square, square_to_sphere};
 /// samples below the horizon.
 pub(crate) const REGION_DEPTH: u32 = 3;
 
+/// Number of regions a side. *Format*, as [`REGION_DEPTH`].
+const REGIONS_A_SIDE: usize = 1 << REGION_DEPTH;
+
 /// Number of regions. *Format*, as [`REGION_DEPTH`].
-pub(crate) const REGIONS: usize = 1 << (2 * REGION_DEPTH);
+pub(crate) const REGIONS: usize = REGIONS_A_SIDE * REGIONS_A_SIDE;
 
 /// Least and largest depth of the level whose texels are summed up. Chosen, not swept.
 ///
@@ -206,41 +209,60 @@ fn center(depth: u32, [x, y]: [u32; 2]) -> Vec3 {
     square_to_sphere(Vec2::new((x as f32 + 0.5) * side, (y as f32 + 0.5) * side))
 }
 
-/// Sums over regions and over groups of four of them, laid out as the levels of a pyramid.
+/// Weights of all regions, and their sums over each column of the square that they form.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RegionSums([f32; level_start(REGION_DEPTH + 1)]);
+pub(crate) struct RegionSums {
+    weights: [f32; REGIONS],
+    /// Of columns rather than rows: a sum of rows is a sum of vectors.
+    columns: [f32; REGIONS_A_SIDE],
+    total: f32,
+}
 
 impl RegionSums {
-    /// Sums up weights of all regions.
+    /// No weight at all.
+    pub(crate) const ZERO: Self = Self { weights: [0.0; REGIONS], columns: [0.0; REGIONS_A_SIDE], total: 0.0 };
+
+    /// Weights of all regions, to be changed in place before they are [summed up](Self::sum_up): what is returned by
+    /// value would be copied.
     #[inline(always)]
-    pub(crate) fn new(weights: &[f32; REGIONS]) -> Self {
-        let mut sums = [0.0; level_start(REGION_DEPTH + 1)];
-        sums[level_start(REGION_DEPTH)..].copy_from_slice(weights);
-        for depth in (0..REGION_DEPTH).rev() {
-            for texel in 0..1_u32 << (2 * depth) {
-                let [a, b, c, d] = super::pyramid::children(&sums, depth, texel % (1 << depth), texel >> depth);
-                sums[level_start(depth) + texel as usize] = (a + b) + (c + d);
+    pub(crate) fn weights_mut(&mut self) -> &mut [f32; REGIONS] {
+        &mut self.weights
+    }
+
+    /// Sums up the weights.
+    #[inline(always)]
+    pub(crate) fn sum_up(&mut self) {
+        let mut columns = [0.0; REGIONS_A_SIDE];
+        for row in self.weights.chunks_exact(REGIONS_A_SIDE) {
+            for i in 0..REGIONS_A_SIDE {
+                columns[i] += row[i];
             }
         }
-        Self(sums)
+        let [a, b, c, d, e, f, g, h] = columns;
+        self.total = ((a + e) + (b + f)) + ((c + g) + (d + h));
+        self.columns = columns;
     }
 
     /// Sum over all regions.
     #[inline]
     pub(crate) fn total(&self) -> f32 {
-        self.0[0]
+        self.total
     }
 
     /// Weight of one region.
     #[inline]
     pub(crate) fn weight(&self, region: usize) -> f32 {
-        self.0[level_start(REGION_DEPTH) + region]
+        self.weights[region]
     }
 
-    /// Weights of the four groups or regions below a group.
+    /// Chooses a region in proportion to its weight: the first variate the column, the second one the region of the
+    /// column.
     #[inline]
-    pub(crate) fn children(&self, depth: u32, [x, y]: [u32; 2]) -> [f32; 4] {
-        super::pyramid::children(&self.0, depth, x, y)
+    pub(crate) fn pick(&self, u: &mut [Variate; 2]) -> [u32; 2] {
+        let column = pick_wide(&self.columns, &mut u[0]).map_or(0, |(column, _)| column);
+        let weights: [f32; REGIONS_A_SIDE] = core::array::from_fn(|row| self.weights[row * REGIONS_A_SIDE + column]);
+        let row = pick_wide(&weights, &mut u[1]).map_or(0, |(row, _)| row);
+        [column as u32, row as u32]
     }
 }
 

@@ -2,7 +2,7 @@
 //! there.
 
 use super::Viewpoint;
-use crate::env::{REGIONS, RegionSums};
+use crate::env::RegionSums;
 use crate::math::only_if;
 use crate::tlas::{FACTORS, FactorBytes};
 use crate::visibility::{FEATURES, RegionFactors, SKY};
@@ -38,7 +38,7 @@ impl Viewpoint<'_> {
     pub(super) fn dim_sky(&self, sums: &mut RegionSums) {
         let Some(region) = &self.visibility else { return };
         let Some(all) = region.get(SKY) else { return };
-        let mut weights: [f32; REGIONS] = core::array::from_fn(|i| sums.weight(i));
+        let weights = sums.weights_mut();
         for (group, weights) in (0..).zip(weights.chunks_exact_mut(FACTORS)) {
             let known = region.get(SKY + 1 + group);
             for (lane, weight) in weights.iter_mut().enumerate() {
@@ -46,7 +46,7 @@ impl Viewpoint<'_> {
                 *weight = only_if(*weight > 0.0, within_range(*weight * factor));
             }
         }
-        keep_positive(&mut weights);
-        *sums = RegionSums::new(&weights);
+        keep_positive(weights);
+        sums.sum_up();
     }
 }

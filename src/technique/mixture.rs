@@ -140,9 +140,14 @@ impl Mixture {
     /// Balances all that lights send with what the environment sends as a light.
     #[inline(never)]
     fn add_sky(&mut self, at: &Viewpoint<'_>, regions: &RegionMoments) {
-        self.sky = Sky::new(at, regions);
-        let Some(sky) = &self.sky else { return };
+        // In place: it is too large to be copied for nothing.
+        let sky = self.sky.insert(Sky::unweighed(at));
+        sky.weigh(at, regions);
         let irradiance = f64::from(sky.irradiance());
+        if !(irradiance > 0.0) {
+            self.sky = None;
+            return;
+        }
         let share = share_beside(irradiance, self.irradiance_of_lights(at));
         let Shares { trees, features, .. } = self.shares;
         let (trees, features) = ((1.0 - share) * trees, (1.0 - share) * features);

@@ -54,20 +54,24 @@ struct Place {
 }
 
 impl Sky {
-    /// Weighs all regions. `None` if nothing can arrive. Inline, as what is returned otherwise is copied.
+    /// Returns the environment at a shading point, before it is weighed.
     #[inline(always)]
-    pub(super) fn new(at: &Viewpoint<'_>, regions: &RegionMoments) -> Option<Self> {
+    pub(super) fn unweighed(at: &Viewpoint<'_>) -> Self {
+        let local = |normal: Vec3| Vec3::from_array(at.scene.environment.local_vector(normal.to_array()));
+        Self { sums: RegionSums::ZERO, receiver: at.x.receiver.map(local) }
+    }
+
+    /// Weighs all regions, which [`Self::irradiance`] sums up. Zero only if nothing can arrive.
+    #[inline(always)]
+    pub(super) fn weigh(&mut self, at: &Viewpoint<'_>, regions: &RegionMoments) {
         if !at.is_somewhere() {
-            return None;
+            return;
         }
-        let environment = &at.scene.environment;
-        let local = |normal: Vec3| Vec3::from_array(environment.local_vector(normal.to_array()));
-        let receiver = at.x.receiver.map(local);
-        let mut sums = InstructionSet::best().run(WeighRegions { regions, receiver });
+        let Self { sums, receiver } = self;
+        InstructionSet::best().run(WeighRegions { regions, receiver: *receiver, sums });
         if at.visibility.is_some() {
-            at.dim_sky(&mut sums);
+            at.dim_sky(sums);
         }
-        (sums.total() > 0.0).then_some(Self { sums, receiver })
     }
 
     /// Estimate of the irradiance.
@@ -77,10 +81,7 @@ impl Sky {
 
     /// Draws a direction. `None` where the part of the regions that the variates lead to is below the horizon.
     pub(super) fn sample(&self, at: &Viewpoint<'_>, mut u: [Variate; 2]) -> Option<SkyDirection> {
-        let mut region = [0, 0];
-        for depth in 0..REGION_DEPTH {
-            region = step(self.sums.children(depth, region), region, &mut u);
-        }
+        let region = self.sums.pick(&mut u);
         let place = self.walk(at, region, |_, texel, weights| step(weights, texel, &mut u))?;
         let environment = &at.scene.environment;
         let sample = environment.sample_below(place.depth, place.texel, &mut u);
@@ -173,16 +174,17 @@ impl Place {
 struct WeighRegions<'m> {
     regions: &'m RegionMoments,
     receiver: Receiver,
+    sums: &'m mut RegionSums,
 }
 
 impl Kernel for WeighRegions<'_> {
-    type Output = RegionSums;
+    type Output = ();
 
     #[inline(always)]
-    fn run(self) -> RegionSums {
-        let Self { regions, receiver } = self;
-        let mut weights = [0.0; REGIONS];
-        receiver.means_over_cones(&regions.axes, &regions.spread, &mut weights);
+    fn run(self) {
+        let Self { regions, receiver, sums } = self;
+        let weights = sums.weights_mut();
+        receiver.means_over_cones(&regions.axes, &regions.spread, weights);
         // Without a horizon, nothing is below it.
         let normal = receiver.normal();
         let reach = if receiver.has_horizon() { 1.0 } else { f32::INFINITY };
@@ -192,7 +194,7 @@ impl Kernel for WeighRegions<'_> {
             let weight = regions.flux[i] * weights[i] + regions.least[i];
             weights[i] = only_if(height > -(reach * regions.reach[i]), weight);
         }
-        keep_positive(&mut weights);
-        RegionSums::new(&weights)
+        keep_positive(weights);
+        sums.sum_up();
     }
 }
