@@ -30,9 +30,10 @@ pub struct EnvironmentSample {
 impl EnvironmentView<'_> {
     /// Draws a direction with a density in proportion to its radiance. `None` if the environment is black.
     ///
-    /// `u` holds two uniform numbers in `[0, 1)`. A stratified set of them gives a stratified set of directions:
-    /// at every second level of the pyramid the second number chooses a row of four texels and the first one a texel of
-    /// the row (two-dimensional hierarchical warp, Clarberg et al. 2005, "Wavelet Importance Sampling").
+    /// `u` holds two uniform numbers in `[0, 1)`. A stratified set of them gives a stratified set of directions: each
+    /// step goes two levels down the pyramid (the first one a single level if their number is odd), where the second
+    /// number chooses the row of texels and the first one the texel of the row (two-dimensional hierarchical warp,
+    /// Clarberg et al. 2005, "Wavelet Importance Sampling").
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
         if self.header.mean <= 0.0 {
@@ -96,11 +97,11 @@ pub(crate) fn step([a, b, c, d]: [f32; 4], [x, y]: [u32; 2], u: &mut [Variate; 2
     [2 * x + i as u32, 2 * y + j as u32]
 }
 
-/// Chooses one of the 16 texels two levels below a texel in proportion to their weights: the second variate the row, the
-/// first one the texel of the row. Half as many choices depend on each other as in two [`step`]s, and what the second
-/// level holds is read while the first is decided.
+/// Chooses one of the 16 texels two levels below a texel in proportion to their weights: the second variate the row,
+/// the first one the texel of the row. Two choices wait for each other, where two [`step`]s make four, and all 16
+/// weights are read at once, not level by level.
 #[inline(always)]
-pub(crate) fn step_twice(rows: &[[f32; 4]; 4], [x, y]: [u32; 2], u: &mut [Variate; 2]) -> [u32; 2] {
+fn step_twice(rows: &[[f32; 4]; 4], [x, y]: [u32; 2], u: &mut [Variate; 2]) -> [u32; 2] {
     let sums = rows.map(|[a, b, c, d]| (a + b) + (c + d));
     let row = pick_wide(&sums, &mut u[1]).map_or(0, |(row, _)| row);
     let column = pick_wide(&rows[row], &mut u[0]).map_or(0, |(column, _)| column);

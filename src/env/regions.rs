@@ -210,7 +210,7 @@ fn center(depth: u32, [x, y]: [u32; 2]) -> Vec3 {
 }
 
 /// Weights of all regions, and their sums over each column of the square that they form.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(crate) struct RegionSums {
     weights: [f32; REGIONS],
     /// Of columns rather than rows: a sum of rows is a sum of vectors.

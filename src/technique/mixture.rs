@@ -262,7 +262,7 @@ impl Mixed<'_> {
 
     /// Probability of the environment as a light, or the expected number of directions.
     pub(crate) fn sky_pmf(&self) -> f64 {
-        self.mixture.sky.map_or(0.0, |_| self.shares.sky)
+        self.mixture.sky.as_ref().map_or(0.0, |_| self.shares.sky)
     }
 
     /// Draws a direction of the environment as a light, if anything can arrive from it.

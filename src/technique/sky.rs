@@ -2,9 +2,9 @@
 //!
 //! The sphere is divided into 64 regions ([`RegionMoments`]). The weight of a region is what it sends to the shading
 //! point, as far as walls are left aside, and the sum of all weights is the estimate of the irradiance. A region is
-//! chosen by its weight, and a direction in it by radiance alone. Only where the horizon of the receiver cuts a region
-//! are the next levels of the pyramid weighed by the receiver as well, so that hardly a direction below the horizon is
-//! drawn.
+//! chosen by its weight, and a direction in it by radiance alone. Only where the horizon of the receiver cuts a
+//! region, or where the receiver has a lobe, are the next levels of the pyramid weighed by the receiver as well, so that
+//! hardly a direction below the horizon is drawn.
 //!
 //! A direction is no point of a triangle. This technique therefore draws and weighs directions, and the mixture adds
 //! its density where a ray leaves the scene.
@@ -20,15 +20,15 @@ use crate::receiver::{Receiver, ReceiverKind};
 use crate::simd::{InstructionSet, Kernel};
 use crate::warp::{Variate, keep_positive};
 
-/// Levels of the pyramid below a region that are weighed by the receiver where the horizon cuts the region. *Measured*
-/// on the host bench's street (docs/CONSTANTS.md): 0 and 3 are as good there. Chosen for suns at the horizon, which are
-/// in texels of six degrees then.
+/// Levels of the pyramid below a region that are weighed by the receiver where the horizon cuts the region, and for a
+/// lobe everywhere. *Measured* on the host bench's street (docs/CONSTANTS.md): 0 and 3 are as good there. Chosen for
+/// suns at the horizon, which are in texels of six degrees then.
 ///
 /// Larger: slower in these regions. Smaller: more samples below the horizon.
 const CUT_LEVELS: u32 = 2;
 
 /// The environment as seen from one shading point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Sky {
     /// Weights of the regions.
     sums: RegionSums,
@@ -61,7 +61,7 @@ impl Sky {
         Self { sums: RegionSums::ZERO, receiver: at.x.receiver.map(local) }
     }
 
-    /// Weighs all regions, which [`Self::irradiance`] sums up. Zero only if nothing can arrive.
+    /// Weighs all regions. Their sum, [`Self::irradiance`], is zero only if nothing can arrive.
     #[inline(always)]
     pub(super) fn weigh(&mut self, at: &Viewpoint<'_>, regions: &RegionMoments) {
         if !at.is_somewhere() {
