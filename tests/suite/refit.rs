@@ -4,7 +4,7 @@ use crate::common::density::{OnTriangle, id, probes};
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LightMesh, Paint, Scene, random_point};
 use crate::common::statistics::Mean;
-use crate::common::tier::some;
+use crate::common::tier::{some, tier};
 use crate::common::{oracle, parallel};
 use fanlight::{
     Arity, Environment, Error, Filter, Hit, LightSample, LightSampler, Mesh, MeshId, MeshUpdate, ShadingPoint,
@@ -175,7 +175,7 @@ fn estimates_agree_with_the_integral_and_with_a_new_build() {
         let (exact, change) = oracle::converged(5e-4, |count| oracle::over_lights(&other, &x, None, count, &sent));
         let estimate = |lights: &LightSampler, pcg: &mut Pcg32| {
             let mut mean = Mean::default();
-            for _ in 0..100_000 {
+            for _ in 0..tier().histogram {
                 let sample = lights.at(&x).sample(pcg.cube());
                 mean.add(sample.map_or(0.0, |s| contribution(&other, &x, &s) / f64::from(s.pdf)));
             }

@@ -117,7 +117,7 @@ fn densities_are_normalized_and_positive_where_light_is() {
                 continue;
             }
             let triangle = whole(&view);
-            let n = 256;
+            let n = 128;
             let (mut sum, mut square) = (0.0, 0.0);
             for i in 0..n * n {
                 let [u, v] = [i % n, i / n].map(|i| (f64::from(i) + f64::from(pcg.next_f32())) / f64::from(n));
