@@ -39,7 +39,7 @@ fn lamps() -> Vec<Lamp> {
 }
 
 /// Returns the dark with 3 x 3 texels for each lamp.
-fn sky() -> Sky {
+pub(super) fn sky() -> Sky {
     let [width, height] = skies::SIZE;
     let mut image = Image { width, height, pixels: vec![Vec3::splat(DARK); width * height] };
     for lamp in lamps() {

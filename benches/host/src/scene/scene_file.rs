@@ -7,7 +7,7 @@ use fanlight_gallery::plain::{self, Outside, PlainMesh, PlainScene, PlainSky, Pl
 use glam::{Mat3, Vec3};
 
 use super::texture::Texture;
-use super::{Emitter, Portal, Radiance, Scene};
+use super::{Emitter, Portal, Radiance, Scene, night};
 use crate::Error;
 use crate::bsdf::Material;
 use crate::camera::Camera;
@@ -21,9 +21,15 @@ const DIAGONAL: f32 = 10.0;
 /// From the sky's own frame to a world whose y is up.
 const UPRIGHT: Mat3 = Mat3::from_cols(Vec3::NEG_Z, Vec3::NEG_X, Vec3::Y);
 
-/// Reads a scene. Prints what is not as the file says.
-pub(crate) fn read(path: &Path, panes: Option<&str>, outside: Outside<'_>) -> Result<Scene, Error> {
-    let read = plain::read(path, panes, outside)?;
+/// Reads a scene. Prints what is not as the file says. Without anything outside of it, the sky of `night-room` lights it.
+pub(crate) fn read(path: &Path, panes: Option<&str>, outside: Option<Outside<'_>>) -> Result<Scene, Error> {
+    // In place of daylight, so that no note says that all is dark.
+    let mut read = plain::read(path, panes, outside.unwrap_or(Outside::Daylight))?;
+    if outside.is_none() {
+        let night = night::sky();
+        let Image { width, height, pixels } = night.image();
+        read.sky = Some(PlainSky { width: *width, height: *height, texels: pixels.clone() });
+    }
     read.notes.iter().for_each(|note| eprintln!("note: {note}"));
     convert(read).map_err(|error| format!("{}: {error}", path.display()).into())
 }
