@@ -7,14 +7,15 @@ use fanlight_gallery::plain::Outside;
 use lexopt::prelude::*;
 
 use crate::Error;
+use crate::scene::Surroundings;
 
 const USAGE: &str = "\
 cargo bench -p fanlight-host --bench host -- [OPTIONS]
 
   --scene NAME    only this scene; may be repeated
   --file PATH     a glTF file in place of the scenes; may be repeated
-  --env FILE      what lights files from outside: a .hdr or .exr image, `none`, or
-                  `night`, the sky of night-room (a clear sky with a sun)
+  --env FILE      what lights files from outside: a .hdr or .exr image, `none`, or `night`, the sky of night-room
+                  (a clear sky with a sun without it)
   --panes PREFIX  materials of files whose names start with this are openings, in place of those called `window`
   --bounces N     only this number of surfaces that light touches (1 and 5 without it); may be repeated
   --seeds N       images of each method (8; 4 with --quick)
@@ -115,13 +116,13 @@ impl Args {
         Ok(Some(args))
     }
 
-    /// Returns what lights files from outside. `None` is the sky of `night-room`.
-    pub(crate) fn outside(&self) -> Option<Outside<'_>> {
+    /// Returns what lights files from outside.
+    pub(crate) fn surroundings(&self) -> Surroundings<'_> {
         match &self.environment {
-            None => Some(Outside::Daylight),
-            Some(path) if path.as_os_str() == "none" => Some(Outside::Dark),
-            Some(path) if path.as_os_str() == "night" => None,
-            Some(path) => Some(Outside::Image(path)),
+            None => Surroundings::Of(Outside::Daylight),
+            Some(path) if path.as_os_str() == "none" => Surroundings::Of(Outside::Dark),
+            Some(path) if path.as_os_str() == "night" => Surroundings::Night,
+            Some(path) => Surroundings::Of(Outside::Image(path)),
         }
     }
 }

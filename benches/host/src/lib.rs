@@ -62,7 +62,7 @@ pub fn run() -> Result<bool, Error> {
     }
     for path in &args.files {
         let name = name_of(path);
-        let scene = scene::read(path, args.panes.as_deref(), args.outside())?;
+        let scene = scene::read(path, args.panes.as_deref(), args.surroundings())?;
         all_is_well &= compare(&name, &World::new(scene), &data, &args, &mut report)?;
     }
     report.finish()?;

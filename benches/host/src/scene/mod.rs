@@ -26,7 +26,7 @@ use crate::sky::Sky;
 
 pub(crate) use catalogue::{ENTRIES, Entry};
 pub(crate) use data::Data;
-pub(crate) use scene_file::read;
+pub(crate) use scene_file::{Surroundings, read};
 pub(crate) use texture::Texture;
 
 /// Radiance of an emitter, the same in all channels.

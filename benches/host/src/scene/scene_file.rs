@@ -21,11 +21,24 @@ const DIAGONAL: f32 = 10.0;
 /// From the sky's own frame to a world whose y is up.
 const UPRIGHT: Mat3 = Mat3::from_cols(Vec3::NEG_Z, Vec3::NEG_X, Vec3::Y);
 
-/// Reads a scene. Prints what is not as the file says. Without anything outside of it, the sky of `night-room` lights it.
-pub(crate) fn read(path: &Path, panes: Option<&str>, outside: Option<Outside<'_>>) -> Result<Scene, Error> {
-    // In place of daylight, so that no note says that all is dark.
-    let mut read = plain::read(path, panes, outside.unwrap_or(Outside::Daylight))?;
-    if outside.is_none() {
+/// What lights a file from outside.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Surroundings<'a> {
+    /// What the gallery knows.
+    Of(Outside<'a>),
+    /// The sky of `night-room`.
+    Night,
+}
+
+/// Reads a scene. Prints what is not as the file says.
+pub(crate) fn read(path: &Path, panes: Option<&str>, surroundings: Surroundings<'_>) -> Result<Scene, Error> {
+    let outside = match surroundings {
+        Surroundings::Of(outside) => outside,
+        // Replaced below: with darkness, a note would say that all is black.
+        Surroundings::Night => Outside::Daylight,
+    };
+    let mut read = plain::read(path, panes, outside)?;
+    if matches!(surroundings, Surroundings::Night) {
         let night = night::sky();
         let Image { width, height, pixels } = night.image();
         read.sky = Some(PlainSky { width: *width, height: *height, texels: pixels.clone() });
@@ -139,5 +152,13 @@ mod tests {
         let [phi, theta] = [(1.5 / width as f32) * core::f32::consts::TAU, 1.5 / height as f32 * core::f32::consts::PI];
         let direction = Vec3::new(phi.sin() * theta.sin(), theta.cos(), -phi.cos() * theta.sin());
         assert!((sky.radiance(direction) - Vec3::ONE).length() < 1e-3, "{}", sky.radiance(direction));
+    }
+
+    #[test]
+    fn night_lights_a_file() {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/fuzz/files/rich.gltf"));
+        let scene = read(path, None, Surroundings::Night).expect("the file is sound");
+        let sky = scene.sky.expect("the sky of night-room");
+        assert_eq!(sky.image().pixels, night::sky().image().pixels);
     }
 }
