@@ -110,8 +110,6 @@ pub(crate) enum ErrorKind {
     EndCount { mesh: usize, found: usize, vertices: usize },
     /// A mesh of an object whose vertices move.
     MotionInObject { object: usize, mesh: usize },
-    /// Something that moves while the shutter is open, among edits.
-    MovingEdit { what: &'static str, number: usize },
     /// More of something than its index type can count.
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A build that the host has cancelled.
@@ -229,12 +227,6 @@ impl fmt::Display for ErrorKind {
             }
             ErrorKind::UnknownInstance { instance, instances } => {
                 write!(f, "instance {instance} was never added, this sampler has {instances}")
-            }
-            ErrorKind::MovingEdit { what, number } => {
-                write!(
-                    f,
-                    "{what} {number} moves while the shutter is open, which only a new build can begin, change or end"
-                )
             }
             ErrorKind::EndCount { mesh, found, vertices } => {
                 write!(

@@ -9,6 +9,11 @@ use crate::math;
 pub(crate) struct Triangle(pub(crate) [Vec3; 3]);
 
 impl Triangle {
+    /// Returns the triangle of three of these positions. Panics if there is no such position.
+    pub(crate) fn of(positions: &[Vec3], indices: [u32; 3]) -> Self {
+        Self(indices.map(|index| positions[index as usize]))
+    }
+
     /// Cross product of two edges: normal of the front side times twice the area. In double precision, where the
     /// differences of coordinates of like size are exact, so that slivers keep their direction.
     #[inline]

@@ -9,7 +9,7 @@ use super::extras;
 use super::instance::{self, AddedObject, InstanceRecord, PlacedObject};
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_end, check_triangles};
 use super::meshes::mesh_of;
-use super::motion::{MotionCollection, end_vertices};
+use super::motion::{EndVertices, MotionCollection, end_vertices};
 use super::profile::{Profile, ProfileCollection};
 use super::projection::Projection;
 use super::{
@@ -250,6 +250,12 @@ impl<'a> LightCollection<'a> {
     pub(super) fn mesh(&self, mesh: u32) -> &[u32] {
         let [start, end] = [mesh, mesh + 1].map(|mesh| self.meshes[mesh as usize] as usize);
         &self.indices[start..end]
+    }
+
+    /// Returns the vertices of the triangles of a mesh at the end of the shutter interval: those of no triangle if it
+    /// stands still.
+    pub(super) fn ends(&self, mesh: u32) -> &[EndVertices] {
+        self.motion.mesh(self.meshes[mesh as usize])
     }
 
     /// Returns a light by its index among those that may emit: first the triangles, then the lamps, then the instances.

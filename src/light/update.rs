@@ -79,21 +79,7 @@ impl Lights {
             return Err(Error(ErrorKind::UnknownMesh { mesh, meshes }));
         }
         let leaves = &self.leaf_of[self.range(mesh)];
-        if let Some((positions, indices)) = update.triangles {
-            if indices.len() != leaves.len() {
-                return Err(Error(ErrorKind::TriangleCount { mesh, found: indices.len(), expected: leaves.len() }));
-            }
-            check_triangles(mesh, positions, indices)?;
-            update.end.map_or(Ok(()), |end| check_end(mesh, positions.len(), end))?;
-            let has_area = |&indices: &[u32; 3]| match update.end {
-                None => triangle(positions, indices).normal_and_area().is_some(),
-                Some(end) => has_area_between(positions, end, indices),
-            };
-            let revived = |&(&leaf, indices): &(&u32, &[u32; 3])| leaf == NO_AREA && has_area(indices);
-            if let Some(triangle) = leaves.iter().zip(indices).position(|pair| revived(&pair)) {
-                return Err(Error(ErrorKind::Revived { mesh, triangle }));
-            }
-        }
+        check_vertices(update, leaves)?;
         let Some(scale) = update.scale else { return Ok(()) };
         let average = |leaf: &u32| self.records.get(*leaf as usize).map_or(0.0, |light| light.root.average);
         let brightest = leaves.iter().map(average).fold(1.0, f32::max);
@@ -124,8 +110,8 @@ impl Lights {
         if let Some((positions, indices)) = update.triangles {
             for (&leaf, &indices) in self.leaf_of[range].iter().zip(indices) {
                 if let Some(light) = self.records.get_mut(leaf as usize) {
-                    light.vertices = triangle(positions, indices).0.map(Vec3::into);
-                    let end = update.end.map(|end| triangle(end, indices).0.map(Vec3::into));
+                    light.vertices = Triangle::of(positions, indices).0.map(Vec3::into);
+                    let end = update.end.map(|end| Triangle::of(end, indices).0.map(Vec3::into));
                     light.mark_motion(end.as_ref());
                 }
             }
@@ -139,6 +125,22 @@ impl Lights {
     }
 }
 
-fn triangle(positions: &[Vec3], indices: [u32; 3]) -> Triangle {
-    Triangle(indices.map(|index| positions[index as usize]))
+/// Checks the vertices of an update, if it has any. `leaves` says which triangles of the mesh have no area.
+pub(super) fn check_vertices(update: &MeshUpdate<'_>, leaves: &[u32]) -> Result<(), Error> {
+    let Some((positions, indices)) = update.triangles else { return Ok(()) };
+    let mesh = update.mesh.0 as usize;
+    if indices.len() != leaves.len() {
+        return Err(Error(ErrorKind::TriangleCount { mesh, found: indices.len(), expected: leaves.len() }));
+    }
+    check_triangles(mesh, positions, indices)?;
+    update.end.map_or(Ok(()), |end| check_end(mesh, positions.len(), end))?;
+    let has_area = |&indices: &[u32; 3]| match update.end {
+        None => Triangle::of(positions, indices).normal_and_area().is_some(),
+        Some(end) => has_area_between(positions, end, indices),
+    };
+    let is_revived = |(leaf, indices): (&u32, &[u32; 3])| *leaf == NO_AREA && has_area(indices);
+    match leaves.iter().zip(indices).position(is_revived) {
+        Some(triangle) => Err(Error(ErrorKind::Revived { mesh, triangle })),
+        None => Ok(()),
+    }
 }

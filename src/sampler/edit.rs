@@ -12,8 +12,8 @@ use crate::record::{InstanceId, LightId, MeshId, TextureId};
 /// Edits of a [`LightSampler`], made by [`LightSampler::edit`]: lights, meshes and instances that are added, removed,
 /// moved, recolored or hidden between two frames.
 ///
-/// Edits take what stands still: what moves while the shutter is open ([`Mesh::moving_to`], [`Instance::moving_to`])
-/// stays as it was built, beside whatever else is edited.
+/// What moves while the shutter is open ([`Mesh::moving_to`], [`MeshUpdate::moving`], [`Instance::moving_to`]) comes,
+/// goes and changes like what stands still, and edits begin and end motion.
 ///
 /// Edits are checked one by one, as they are made, and take effect all together in [`Self::apply`]. Each counts for
 /// those after it: what was removed is unknown from then on, and what was added can be changed. Without a call of
@@ -55,6 +55,7 @@ use crate::record::{InstanceId, LightId, MeshId, TextureId};
 /// - The first batch of a sampler takes about the time of a [`refit`](LightSampler::refit).
 /// - A textured mesh takes the time to build its trees, as in the builder.
 /// - Edits of [`DistantLight`](crate::DistantLight)s take a time in proportion to the number of all of these.
+/// - A batch that changes where meshes or instances move takes a time in proportion to the number of all that move.
 /// - A change of a mesh takes a time in proportion to the number of its triangles.
 ///
 /// Places of what was removed are used again, so that memory is bounded by what a sampler has held at a time, however
@@ -209,7 +210,7 @@ impl<'a> LightEdits<'_, 'a> {
     ///
     /// If there is no such mesh.
     pub fn remove_mesh(&mut self, id: MeshId) -> Result<(), Error> {
-        self.changes.remove_mesh(self.edited.lights, self.state, id)
+        self.changes.remove_mesh(self.state, id)
     }
 
     /// Adds an instance of an object that the sampler was built with, as
@@ -239,7 +240,7 @@ impl<'a> LightEdits<'_, 'a> {
     ///
     /// If there is no such instance.
     pub fn remove_instance(&mut self, id: InstanceId) -> Result<(), Error> {
-        self.changes.remove_instance(self.edited.lights, self.state, id)
+        self.changes.remove_instance(self.state, id)
     }
 
     /// Applies all edits of the batch. After an error the sampler is as it was before the batch.

@@ -14,12 +14,13 @@ use fanlight::{
     ObjectId, PointLight, SampledLight, ShadingPoint, SphereLight, TextureId, Weight,
 };
 use glam::{Affine3A, Vec3};
-use world::World;
+use world::{KINDS, World};
 
 /// A shading point that every light of a world can send to: in a volume, which two-sided lights and spheres always
 /// reach.
-fn volume(pcg: &mut Pcg32) -> ShadingPoint {
-    ShadingPoint::volume(4.0 * Vec3::from_array(pcg.cube()) - 2.0)
+fn volume(world: &World, pcg: &mut Pcg32) -> ShadingPoint {
+    let x = ShadingPoint::volume(4.0 * Vec3::from_array(pcg.cube()) - 2.0);
+    if world.moves { x.at_time([0.0, 1.0, pcg.within(0.0, 1.0)][pcg.below(3)]) } else { x }
 }
 
 /// Compares an edited sampler with a fresh build of the same lights.
@@ -31,7 +32,7 @@ fn compare(world: &World, lights: &LightSampler, pcg: &mut Pcg32) -> Result<(), 
     prop_assert!(loaded.is_ok(), "{:?}", loaded.err());
     let mut points = Vec::new();
     for _ in 0..4 {
-        let x = volume(pcg);
+        let x = volume(world, pcg);
         let (at, other) = (lights.at(&x), fresh.lights.at(&x));
         let mut sums = [0.0f64; 2];
         for (light, new) in world.lights().zip(&fresh.ids) {
@@ -76,7 +77,7 @@ fn random_edits_leave_the_lights_of_a_fresh_build() {
     };
     let edits = prop::collection::vec(any::<[u16; 3]>(), 0..150);
     let run =
-        TestRunner::new(config).run(&(0..12usize, 0..40usize, edits, any::<u64>()), |(kind, count, edits, seed)| {
+        TestRunner::new(config).run(&(0..2 * KINDS, 0..40usize, edits, any::<u64>()), |(kind, count, edits, seed)| {
             let mut pcg = Pcg32::new(seed, 71);
             let mut world = World::random(&mut pcg, kind, count);
             let mut lights = world.build().lights;
@@ -116,7 +117,7 @@ pub(crate) fn edited(seed: u64, kind: usize, batch: usize) -> (World, LightSampl
 #[test]
 fn batches_of_any_size_end_in_a_fresh_build() {
     for (seed, batch) in (0..).zip([1, 7, 400]) {
-        for kind in (seed as usize..12).step_by(3) {
+        for kind in (seed as usize..2 * KINDS).step_by(3) {
             let (world, lights) = edited(seed, kind, batch);
             compare(&world, &lights, &mut Pcg32::new(seed, 75)).expect("the lights are those of a fresh build");
         }
@@ -125,7 +126,7 @@ fn batches_of_any_size_end_in_a_fresh_build() {
 
 #[test]
 fn equal_edits_give_equal_samplers() {
-    for kind in [1, 2, 7, 10] {
+    for kind in [1, 2, 7, 10, 13, 15] {
         let [one, other] = [0; 2].map(|_| edited(5, kind, 30).1.to_bytes());
         assert!(one == other, "{kind}");
     }
@@ -301,8 +302,14 @@ fn an_empty_scene_can_be_edited() {
 /// Places of what was removed are used again. Of trees over textures, some hundred kilobytes may wait to be removed.
 #[test]
 fn memory_is_bounded() {
+    for kind in [7, KINDS + 7] {
+        check_memory(kind);
+    }
+}
+
+fn check_memory(kind: usize) {
     let mut pcg = Pcg32::new(3, 77);
-    let mut world = World::random(&mut pcg, 7, 200);
+    let mut world = World::random(&mut pcg, kind, 200);
     let mut lights = world.build().lights;
     for round in 1..=100 {
         let mut edit = lights.edit();

@@ -3,17 +3,16 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use glam::Vec3;
-
 use super::changes::{InstanceChange, LampChange, MeshChange, check_scale, class_of, places_of};
-use super::{EditState, LightChanges, LightStore, LightsState, StoredLight, UNIT_DRIFT, append_cells};
+use super::{EditState, LightChanges, LightStore, LightsState, StoredLight, UNIT_DRIFT, append_cells, motion};
 use crate::blas::LEAF;
 use crate::env::Environment;
 use crate::error::{Error, ErrorKind};
 use crate::light::distant::{self, DistantRecord};
 use crate::light::instance::{InstanceRecord, PlacedObject, RECORD_WORDS, emits, first_object, records, records_mut};
 use crate::light::{
-    Energies, Light, LightCollection, LightKind, LightTriangle, Lights, NO_AREA, NO_LEAF, extras, storable,
+    Energies, Light, LightCollection, LightKind, LightTriangle, Lights, MovingTriangle, NO_AREA, NO_LEAF, extras,
+    storable,
 };
 use crate::progress::Progress;
 use crate::receiver::ALL_GROUPS;
@@ -84,6 +83,11 @@ impl EditState {
         // 2. Room for what is added.
         let base = append_cells(&mut lights.cells, &collection.cells);
         self.lights.reserve_instances(lights, &instances);
+        for (&number, change) in &meshes {
+            if let Some(added) = change.added {
+                self.lights.allocate_mesh(lights, number, collection.mesh(added).len() as u32);
+            }
+        }
         let has_groups = |groups: Option<u32>| groups.is_some_and(|groups| groups != ALL_GROUPS);
         let limits_groups = lamps.values().flatten().any(|change| has_groups(change.groups))
             || instances.values().flatten().any(|change| has_groups(change.groups))
@@ -101,7 +105,8 @@ impl EditState {
             edit.store.unit = *unit;
             edit.fit_all();
         }
-        // 4. One light after the other.
+        // 4. One light after the other, where motion is known.
+        motion::update(edit.store.lights, &collection, (&lamps, &meshes, &instances));
         let known = edit.store.lights.view().extras().distants();
         let distants = known.iter().map(|light| (light.number(), *light)).collect();
         let mut all = Application { state, tree: edit, distants, distants_change: false };
@@ -205,55 +210,56 @@ impl Application<'_, '_> {
     }
 
     fn change_mesh(&mut self, number: u32, change: MeshChange, collection: &LightCollection<'_>, base: u32) {
-        let added = change.added.map(|added| (collection.mesh(added), collection.mesh_groups[added as usize]));
-        if let Some((triangles, groups)) = added {
-            self.state.allocate_mesh(self.tree.store.lights, number, triangles.len() as u32);
-            if !change.is_removed {
-                self.add_mesh(number, triangles, groups, collection, base);
-            }
-        }
         let places = self.state.places(self.tree.store.lights, number);
         if change.is_removed {
             places.for_each(|place| self.clear(place));
             self.state.free_mesh(self.tree.store.lights, number);
             return;
         }
+        if let Some(added) = change.added {
+            self.add_mesh(number, added, collection, base);
+        }
         if let Some(scale) = change.scale {
             self.set_scale(number, scale);
         }
-        if change.triangles.is_some() {
+        if change.vertices.is_some() {
             self.lights().is_crossed_once = false;
         }
-        if change.triangles.is_none() && change.scale.is_none() {
+        if change.vertices.is_none() && change.scale.is_none() {
             return;
         }
         for (i, place) in places.enumerate() {
             let leaf = self.lights().leaf_of[place];
             if Self::is_leaf(leaf) {
-                if let Some(triangles) = &change.triangles {
-                    self.lights().records[leaf as usize].vertices = triangles[i].0.map(Vec3::into);
+                if let Some(vertices) = &change.vertices {
+                    vertices.give(i, &mut self.lights().records[leaf as usize]);
                 }
                 self.tree.update(leaf);
             }
         }
     }
 
-    fn add_mesh(&mut self, number: u32, triangles: &[u32], groups: u32, collection: &LightCollection<'_>, base: u32) {
+    fn add_mesh(&mut self, number: u32, added: u32, collection: &LightCollection<'_>, base: u32) {
+        let (triangles, ends) = (collection.mesh(added), collection.ends(added));
+        let groups = collection.mesh_groups[added as usize];
         self.lights().is_crossed_once = false;
         if !self.lights().scales.is_empty() {
             self.set_scale(number, 1.0);
         }
-        for (place, &index) in self.state.places(self.tree.store.lights, number).zip(triangles) {
+        let energies = Energies::new(self.tree.store.environment, &[], &[]);
+        for (i, place) in self.state.places(self.tree.store.lights, number).enumerate() {
+            let index = triangles[i];
             let Some(&(mut record)) = collection.triangles.get(index as usize) else {
                 self.lights().leaf_of[place] = index;
                 continue;
             };
             let flags = record.index_and_flags & (LightTriangle::TWO_SIDED | LightTriangle::PORTAL);
             record.index_and_flags = flags | place as u32;
+            record.mark_motion(ends.get(i));
             if record.root.node != LEAF {
                 record.root.node += base;
             }
-            if self.tree.store.energy(&record) > 0.0 {
+            if energies.energy(collection.light(index)) > 0.0 {
                 self.lights().has_portals |= record.is_portal();
                 self.tree.insert(StoredLight { record, groups });
             }
@@ -270,7 +276,7 @@ impl Application<'_, '_> {
 
     fn change_instance(&mut self, number: u32, change: Option<InstanceChange>) {
         let leaf = records(&self.tree.store.lights.instances)[number as usize].leaf;
-        let Some(InstanceChange { record, groups }) = change else {
+        let Some(InstanceChange { record, groups, .. }) = change else {
             self.take_instance(number);
             return self.state.instances.remove(number);
         };
@@ -404,23 +410,32 @@ impl LightsState {
             };
             for (i, &leaf) in leaves.iter().enumerate() {
                 let Some(record) = records.get(leaf as usize) else { continue };
-                let moved = change.triangles.as_ref().map(|triangles| triangles[i].0.map(Vec3::into));
-                let moved = moved.map_or(*record, |vertices| LightTriangle { vertices, ..*record });
-                sum += scale * energies.energy(Light::Triangle(&moved));
                 if change.added.is_some() {
-                    sum += scale * energies.energy(Light::Triangle(record));
+                    sum += scale * energies.energy(collection.light(leaf));
+                } else if change.vertices.is_none() {
+                    sum += scale * energies.energy(Light::of(record, extras, &[], lights.time));
+                }
+                if let Some(vertices) = &change.vertices {
+                    let mut moved = *record;
+                    vertices.give(i, &mut moved);
+                    sum += scale
+                        * energies.energy(match vertices.end.get(i) {
+                            Some(end) => Light::Moving(MovingTriangle::between(&moved, end)),
+                            None => Light::Triangle(&moved),
+                        });
                 }
             }
         }
         let first = first_object(records(&lights.instances).len()) as u32;
-        for InstanceChange { record, .. } in instances.values().flatten() {
+        for InstanceChange { record, end, .. } in instances.values().flatten() {
             let record = InstanceRecord { object: first + record.object, ..*record };
-            sum += energies.energy(Light::Instance(PlacedObject::new(&record, &lights.instances)));
+            let placed = PlacedObject::new(&record, &lights.instances).moving_to(end.as_ref());
+            sum += energies.energy(Light::Instance(placed));
         }
         sum
     }
 }
 
 /// What becomes of lamps, meshes and instances.
-type Changes<'c> =
+pub(super) type Changes<'c> =
     (&'c BTreeMap<u32, Option<LampChange>>, &'c BTreeMap<u32, MeshChange>, &'c BTreeMap<u32, Option<InstanceChange>>);

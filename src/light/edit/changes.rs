@@ -3,13 +3,17 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
+use glam::Vec3;
+
 use super::{EditState, LightsState};
 use crate::blas::{self, Procedural, Texture};
 use crate::error::{Error, ErrorKind};
 use crate::geometry::Triangle;
 use crate::light::instance::{InstanceRecord, Object, first_object, records};
-use crate::light::mesh::{Mesh, MeshUpdate, check_triangles};
-use crate::light::{Instance, Lamp, LampRecord, LightCollection, Lights, NO_AREA};
+use crate::light::mesh::{Mesh, MeshUpdate};
+use crate::light::motion::{EndColumns, EndVertices, end_vertices};
+use crate::light::update::check_vertices;
+use crate::light::{Instance, Lamp, LampRecord, LightCollection, LightTriangle, Lights};
 use crate::record::{InstanceId, LightId, MeshId, ObjectId, TextureId};
 use crate::tlas::MAX_LEAVES;
 
@@ -46,9 +50,15 @@ pub(super) struct MeshChange {
     /// Number in the collection of one that is added.
     pub(super) added: Option<u32>,
     pub(super) is_removed: bool,
-    /// New vertices of all triangles.
-    pub(super) triangles: Option<Vec<Triangle>>,
+    pub(super) vertices: Option<NewVertices>,
     pub(super) scale: Option<f32>,
+}
+
+/// New vertices of all triangles of a mesh.
+pub(super) struct NewVertices {
+    pub(super) start: Vec<Triangle>,
+    /// Those at the end of the shutter interval; of no triangle if the mesh stands still.
+    pub(super) end: Vec<EndVertices>,
 }
 
 /// What becomes of an instance.
@@ -56,6 +66,8 @@ pub(super) struct MeshChange {
 pub(super) struct InstanceChange {
     /// Its object is numbered as in [`LightsState::objects`].
     pub(super) record: InstanceRecord,
+    /// Transform at the end of the shutter interval, if the instance moves.
+    pub(super) end: Option<EndColumns>,
     pub(super) groups: Option<u32>,
 }
 
@@ -68,6 +80,14 @@ pub(super) fn class_of(places: u32) -> u32 {
 /// Returns the number of places that a new mesh gets for its triangles.
 pub(super) fn places_of(triangles: u32) -> u32 {
     if triangles == 0 { 0 } else { triangles.next_power_of_two() }
+}
+
+impl NewVertices {
+    /// Gives the record of a triangle of the mesh its vertices, and says whether they move.
+    pub(super) fn give(&self, triangle: usize, record: &mut LightTriangle) {
+        record.vertices = self.start[triangle].0.map(Vec3::into);
+        record.mark_motion(self.end.get(triangle));
+    }
 }
 
 impl<'a> LightChanges<'a> {
@@ -154,9 +174,6 @@ impl<'a> LightChanges<'a> {
 
     /// Adds a mesh.
     pub(crate) fn add_mesh(&mut self, lights: &Lights, state: &EditState, mesh: &Mesh<'_>) -> Result<MeshId, Error> {
-        if mesh.end.is_some() {
-            return Err(Error(ErrorKind::MovingEdit { what: "added mesh", number: self.collection.meshes.len() - 1 }));
-        }
         let triangles = mesh.indices.len();
         check_count("triangles", triangles.saturating_add(lights.leaf_of.len()).saturating_add(self.places))?;
         let places = places_of(triangles as u32);
@@ -185,31 +202,18 @@ impl<'a> LightChanges<'a> {
         update: &MeshUpdate<'_>,
     ) -> Result<(), Error> {
         let MeshId(number) = update.mesh;
-        self.check_mesh(lights, &state.lights, number)?;
+        self.check_mesh(&state.lights, number)?;
         let mesh = number as usize;
-        if update.end.is_some() {
-            return Err(Error(ErrorKind::MovingEdit { what: "mesh", number: mesh }));
-        }
         let added = self.meshes.get(&number).and_then(|change| change.added);
         let leaves = match added {
             Some(added) => self.collection.mesh(added),
             None => &lights.leaf_of[state.lights.places(lights, number)],
         };
-        let triangles = update.triangles.map(|(positions, indices)| {
-            if indices.len() != leaves.len() {
-                return Err(Error(ErrorKind::TriangleCount { mesh, found: indices.len(), expected: leaves.len() }));
-            }
-            check_triangles(mesh, positions, indices)?;
-            let of = |indices: &[u32; 3]| Triangle(indices.map(|index| positions[index as usize]));
-            let triangles: Vec<Triangle> = indices.iter().map(of).collect();
-            let revived =
-                |(leaf, triangle): (&u32, &Triangle)| *leaf == NO_AREA && triangle.normal_and_area().is_some();
-            match leaves.iter().zip(&triangles).position(revived) {
-                Some(triangle) => Err(Error(ErrorKind::Revived { mesh, triangle })),
-                None => Ok(triangles),
-            }
+        check_vertices(update, leaves)?;
+        let vertices = update.triangles.map(|(positions, indices)| NewVertices {
+            start: indices.iter().map(|&indices| Triangle::of(positions, indices)).collect(),
+            end: update.end.filter(|end| *end != positions).map_or_else(Vec::new, |end| end_vertices(end, indices)),
         });
-        let triangles = triangles.transpose()?;
         if let Some(scale) = update.scale {
             let average = |leaf: &u32| lights.records.get(*leaf as usize).map_or(0.0, |light| light.root.average);
             // Of an added mesh it is known only when its textures are built.
@@ -217,41 +221,27 @@ impl<'a> LightChanges<'a> {
             check_scale(mesh, scale, known.iter().map(average).fold(1.0, f32::max))?;
         }
         let change = self.meshes.entry(number).or_default();
-        change.triangles = triangles.or(change.triangles.take());
+        change.vertices = vertices.or(change.vertices.take());
         change.scale = update.scale.or(change.scale);
         Ok(())
     }
 
     /// Removes a mesh.
-    pub(crate) fn remove_mesh(
-        &mut self,
-        lights: &Lights,
-        state: &EditState,
-        MeshId(number): MeshId,
-    ) -> Result<(), Error> {
-        self.check_mesh(lights, &state.lights, number)?;
+    pub(crate) fn remove_mesh(&mut self, state: &EditState, MeshId(number): MeshId) -> Result<(), Error> {
+        self.check_mesh(&state.lights, number)?;
         let change = self.meshes.entry(number).or_default();
         *change = MeshChange { is_removed: true, added: change.added, ..MeshChange::default() };
         Ok(())
     }
 
-    /// `Ok` if there is such a mesh and it stands still.
-    fn check_mesh(&self, lights: &Lights, state: &LightsState, number: u32) -> Result<(), Error> {
+    /// `Ok` if there is such a mesh.
+    fn check_mesh(&self, state: &LightsState, number: u32) -> Result<(), Error> {
         let exists = match self.meshes.get(&number) {
             Some(change) => !change.is_removed,
             None => state.meshes.contains(number),
         };
         let (mesh, meshes) = (number as usize, state.meshes.count() as usize);
-        if !exists {
-            return Err(Error(ErrorKind::UnknownMesh { mesh, meshes }));
-        }
-        let first = lights.meshes.get(mesh).filter(|_| !self.meshes.contains_key(&number));
-        match first {
-            Some(first) if lights.view().extras().motion().moves_mesh(*first) => {
-                Err(Error(ErrorKind::MovingEdit { what: "mesh", number: mesh }))
-            }
-            _ => Ok(()),
-        }
+        if exists { Ok(()) } else { Err(Error(ErrorKind::UnknownMesh { mesh, meshes })) }
     }
 
     /// Adds an instance.
@@ -263,9 +253,9 @@ impl<'a> LightChanges<'a> {
     ) -> Result<InstanceId, Error> {
         let number = state.lights.instances.next(self.next_instance);
         check_count("instances", number as usize + 1)?;
-        check_still(instance, number)?;
         let record = instance_record(lights, &state.lights, instance, number)?;
-        self.instances.insert(number, Some(InstanceChange { record, groups: Some(instance.groups) }));
+        let (end, groups) = (instance.end_columns(), Some(instance.groups));
+        self.instances.insert(number, Some(InstanceChange { record, end, groups }));
         self.next_instance = number + 1;
         Ok(InstanceId(number))
     }
@@ -279,41 +269,29 @@ impl<'a> LightChanges<'a> {
         instance: &Instance,
         keeps_groups: bool,
     ) -> Result<(), Error> {
-        self.check_instance(lights, &state.lights, number)?;
-        check_still(instance, number)?;
+        self.check_instance(&state.lights, number)?;
         let record = instance_record(lights, &state.lights, instance, number)?;
         let before = self.instances.get(&number).copied().flatten().and_then(|before| before.groups);
         let groups = if keeps_groups { before } else { Some(instance.groups) };
-        self.instances.insert(number, Some(InstanceChange { record, groups }));
+        self.instances.insert(number, Some(InstanceChange { record, end: instance.end_columns(), groups }));
         Ok(())
     }
 
     /// Removes an instance.
-    pub(crate) fn remove_instance(
-        &mut self,
-        lights: &Lights,
-        state: &EditState,
-        InstanceId(number): InstanceId,
-    ) -> Result<(), Error> {
-        self.check_instance(lights, &state.lights, number)?;
+    pub(crate) fn remove_instance(&mut self, state: &EditState, InstanceId(number): InstanceId) -> Result<(), Error> {
+        self.check_instance(&state.lights, number)?;
         self.instances.insert(number, None);
         Ok(())
     }
 
-    /// `Ok` if there is such an instance and it stands still.
-    fn check_instance(&self, lights: &Lights, state: &LightsState, number: u32) -> Result<(), Error> {
+    /// `Ok` if there is such an instance.
+    fn check_instance(&self, state: &LightsState, number: u32) -> Result<(), Error> {
         let exists = match self.instances.get(&number) {
             Some(change) => change.is_some(),
             None => state.instances.contains(number),
         };
         let (instance, instances) = (number as usize, state.instances.count() as usize);
-        if !exists {
-            return Err(Error(ErrorKind::UnknownInstance { instance, instances }));
-        }
-        if lights.view().extras().motion().instances().binary_search(&number).is_ok() {
-            return Err(Error(ErrorKind::MovingEdit { what: "instance", number: instance }));
-        }
-        Ok(())
+        if exists { Ok(()) } else { Err(Error(ErrorKind::UnknownInstance { instance, instances })) }
     }
 }
 
@@ -333,14 +311,6 @@ impl LightsState {
         }
         let first = first_object(records(&lights.instances).len()) as u32;
         Some((Object::at(&lights.instances, first + start), start))
-    }
-}
-
-/// `Ok` if an instance stands still.
-fn check_still(instance: &Instance, number: u32) -> Result<(), Error> {
-    match instance.end_columns() {
-        Some(_) => Err(Error(ErrorKind::MovingEdit { what: "instance", number: number as usize })),
-        None => Ok(()),
     }
 }
 

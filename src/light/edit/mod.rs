@@ -11,6 +11,7 @@
 mod apply;
 mod changes;
 mod layout;
+mod motion;
 mod numbers;
 
 use alloc::boxed::Box;

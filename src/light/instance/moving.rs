@@ -118,6 +118,11 @@ impl<'a> PlacedObject<'a> {
         Self { end, time, ..self }
     }
 
+    /// Returns the instance with this transform at the end of the interval, at its start.
+    pub(in crate::light) fn moving_to(self, end: Option<&'a EndColumns>) -> Self {
+        Self { end, time: 0.0, ..self }
+    }
+
     /// Returns the map to the world at the time of the instance.
     #[inline(always)]
     pub(super) fn placement(&self) -> Placement {

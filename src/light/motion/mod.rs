@@ -178,6 +178,12 @@ impl MotionCollection {
         }
     }
 
+    /// Returns the vertices of the triangles of a mesh by the number of its first one: those of no triangle if it
+    /// stands still.
+    pub(super) fn mesh(&self, first: u32) -> &[EndVertices] {
+        self.meshes.get(&first).map_or(&[], |triangles| triangles)
+    }
+
     /// Sets the vertices of the triangles of a mesh by the number of its first one: those of no triangle if it stands
     /// still.
     pub(super) fn set_mesh(&mut self, first: u32, triangles: Vec<EndVertices>) {

@@ -51,7 +51,7 @@ impl LightTriangle {
     pub(in crate::light) fn never_has_an_area(&self, end: Option<&EndVertices>) -> bool {
         match end {
             None => self.triangle().normal_and_area().is_none(),
-            Some(end) => MovingTriangle { record: self, end, time: 0.0 }.has_no_area(),
+            Some(end) => MovingTriangle::between(self, end).has_no_area(),
         }
     }
 }
@@ -69,6 +69,11 @@ impl<'a> MovingTriangle<'a> {
     pub(in crate::light) fn new(record: &'a LightTriangle, motion: Motion<'a>, time: f32) -> Self {
         let end = motion.end_of_triangle(record.index()).unwrap_or(&record.vertices);
         Self { record, end, time: time.into() }
+    }
+
+    /// Returns the triangle that moves from the vertices of a record to these, at the start of the interval.
+    pub(in crate::light) fn between(record: &'a LightTriangle, end: &'a EndVertices) -> Self {
+        Self { record, end, time: 0.0 }
     }
 
     /// Returns the same triangle at another time.

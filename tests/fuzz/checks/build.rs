@@ -69,7 +69,10 @@ pub(crate) fn edit(lights: &mut LightSampler, reader: &mut Reader<'_>) {
         let instance = |reader: &mut Reader<'_>| {
             let [x, y, z, place] = [(); 4].map(|()| reader.vector());
             let transform = Affine3A::from_mat3_translation(Mat3::from_cols(x, y, z), place);
-            Instance::new(ObjectId::from_index(number % 3), transform).scaled(reader.float())
+            let end = Affine3A::from_mat3_translation(Mat3::from_cols(x + place, y, z), -place);
+            let instance = Instance::new(ObjectId::from_index(number % 3), transform).scaled(reader.float());
+            // By no byte of its own.
+            if number > 3 { instance.moving_to(end) } else { instance }
         };
         // What is refused leaves the batch as it was.
         let _ = match action {
@@ -82,11 +85,15 @@ pub(crate) fn edit(lights: &mut LightSampler, reader: &mut Reader<'_>) {
                     _ => edits.remove_light(id),
                 }
             }
-            3 => edits.add_mesh(&Soup::read(reader).mesh(&textures)).map(drop),
+            3 => edits.add_mesh(&Soup::read(reader).moving(&textures)).map(drop),
             4 => {
                 let soup = Soup::read(reader);
                 let update = MeshUpdate::new(MeshId::from_index(number)).scaled(reader.float());
-                edits.update_mesh(&update.moved(&soup.positions, &soup.indices)).or(edits.update_mesh(&update))
+                let moved = match soup.is_moving() {
+                    true => update.moving(&soup.positions, &soup.end, &soup.indices),
+                    false => update.moved(&soup.positions, &soup.indices),
+                };
+                edits.update_mesh(&moved).or(edits.update_mesh(&update))
             }
             5 => edits.remove_mesh(MeshId::from_index(number)),
             6 => edits.add_instance(instance(reader)).map(drop),
@@ -251,10 +258,15 @@ impl Soup {
         if self.positions.len() % 3 == 2 { 2 } else { u32::MAX }
     }
 
-    /// The mesh, whose vertices may move: by no byte of its own.
+    /// Whether the vertices move: by no byte of its own.
+    fn is_moving(&self) -> bool {
+        matches!(self.positions.len(), 7 | 9)
+    }
+
+    /// The mesh, whose vertices may move.
     fn moving(&self, textures: &[TextureId]) -> Mesh<'_> {
         let mesh = self.mesh(textures);
-        if matches!(self.positions.len(), 7 | 9) { mesh.moving_to(&self.end) } else { mesh }
+        if self.is_moving() { mesh.moving_to(&self.end) } else { mesh }
     }
 
     fn mesh(&self, textures: &[TextureId]) -> Mesh<'_> {

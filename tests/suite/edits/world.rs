@@ -17,6 +17,8 @@ use glam::{Affine3A, Quat, Vec2, Vec3};
 #[derive(Clone, Debug)]
 struct Patch {
     positions: Vec<Vec3>,
+    /// Positions at the end of the shutter interval, if the mesh moves.
+    end: Option<Vec<Vec3>>,
     uvs: Vec<Vec2>,
     weight: f32,
     scale: f32,
@@ -29,6 +31,8 @@ struct Patch {
 #[derive(Clone, Debug)]
 pub(crate) struct World {
     kind: usize,
+    /// Whether meshes and instances may move while the shutter is open.
+    pub(crate) moves: bool,
     lamps: BTreeMap<LightId, (Lamp, u32)>,
     patches: BTreeMap<MeshId, Patch>,
     instances: BTreeMap<InstanceId, Instance>,
@@ -49,6 +53,8 @@ pub(crate) struct Built {
 }
 
 const ALL: u32 = u32::MAX;
+/// Kinds of worlds in which nothing moves.
+pub(crate) const KINDS: usize = 12;
 /// Texels of the only texture.
 const TEXELS: [f32; 16] = [0.1, 0.9, 0.4, 0.0, 2.0, 0.3, 0.2, 0.7, 0.5, 0.0, 1.0, 0.8, 0.6, 0.1, 0.3, 5.0];
 
@@ -73,6 +79,7 @@ impl Patch {
         let uvs = positions.iter().map(|p| Vec2::new(p.x, p.y)).collect();
         Self {
             positions,
+            end: None,
             uvs,
             weight: pcg.within(0.1, 4.0),
             scale: 1.0,
@@ -95,7 +102,17 @@ impl Patch {
             Mesh::emitter(&self.positions, &indices)
         };
         let weight = if self.is_textured { Weight::Texture(texture) } else { Weight::Constant(self.weight) };
-        then(&mesh.weight(weight).uvs(&self.uvs).sides(Sides::Two).groups(self.groups))
+        let mesh = mesh.weight(weight).uvs(&self.uvs).sides(Sides::Two).groups(self.groups);
+        then(&match &self.end {
+            Some(end) => mesh.moving_to(end),
+            None => mesh,
+        })
+    }
+
+    /// Begins, changes or ends a motion.
+    fn move_at_random(&mut self, pcg: &mut Pcg32) {
+        let (by, turn) = (pcg.direction(), Quat::from_axis_angle(pcg.direction(), pcg.within(0.0, 1.5)));
+        self.end = (pcg.below(3) > 0).then(|| self.positions.iter().map(|p| turn * *p + 0.5 * by).collect());
     }
 }
 
@@ -119,15 +136,18 @@ fn lamp(pcg: &mut Pcg32) -> Lamp {
 }
 
 impl World {
-    /// Lights of some kinds: without an extent, of all kinds, with light groups, with instances.
+    /// Lights of some kinds: without an extent, of all kinds, with light groups, with instances. From the twelfth kind
+    /// on, they are the same, and some move.
     pub(crate) fn random(pcg: &mut Pcg32, kind: usize, count: usize) -> Self {
-        let mut world = Self { kind, lamps: BTreeMap::new(), patches: BTreeMap::new(), instances: BTreeMap::new() };
+        let (kind, moves) = (kind % KINDS, kind >= KINDS);
+        let (lamps, patches, instances) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        let mut world = Self { kind, moves, lamps, patches, instances };
         for _ in 0..count {
             let groups = world.groups(pcg);
             match pcg.below(3) {
                 0 if world.has_meshes() => {
                     let id = MeshId::from_index(world.patches.len() as u32);
-                    world.patches.insert(id, Patch::random(pcg, groups));
+                    world.patches.insert(id, world.patch(pcg, groups));
                 }
                 1 if world.has_instances() => {
                     let id = InstanceId::from_index(world.instances.len() as u32);
@@ -140,6 +160,14 @@ impl World {
             }
         }
         world
+    }
+
+    fn patch(&self, pcg: &mut Pcg32, groups: u32) -> Patch {
+        let mut patch = Patch::random(pcg, groups);
+        if self.moves {
+            patch.move_at_random(pcg);
+        }
+        patch
     }
 
     fn has_meshes(&self) -> bool {
@@ -171,7 +199,13 @@ impl World {
         let place =
             Affine3A::from_scale_rotation_translation(scale, rotation, 4.0 * Vec3::from_array(pcg.cube()) - 2.0);
         let factor = if pcg.below(6) == 0 { 0.0 } else { pcg.within(0.5, 2.0) };
-        Instance::new(ObjectId::from_index(pcg.below(2) as u32), place).scaled(factor).groups(groups)
+        let instance = Instance::new(ObjectId::from_index(pcg.below(2) as u32), place).scaled(factor).groups(groups);
+        if !self.moves || pcg.below(3) == 0 {
+            return instance;
+        }
+        // It can be inverted at all times, as it turns by less than a right angle.
+        let turn = Affine3A::from_axis_angle(pcg.direction(), pcg.within(0.0, 1.2));
+        instance.moving_to(Affine3A::from_translation(pcg.direction()) * turn * place)
     }
 
     fn environment(&self) -> Environment {
@@ -279,24 +313,32 @@ impl World {
                 self.lamps.remove(&id);
             }
             5 if self.has_meshes() => {
-                let patch = Patch::random(pcg, groups);
+                let patch = self.patch(pcg, groups);
                 let texture = edits.add_texture(texture());
                 let id = patch.with(texture, |mesh| edits.add_mesh(mesh))?;
                 assert!(self.patches.insert(id, patch).is_none(), "an id is given out twice");
             }
             6..8 => {
                 let place = nth(self.patches.len());
+                let (moves, keeps_place) = (self.moves, self.moves && which % 2 == 0);
                 let Some((&id, patch)) = self.patches.iter_mut().nth(place) else { return Ok(()) };
                 let (by, turn) = (pcg.direction(), Quat::from_rotation_arc(pcg.direction(), pcg.direction()));
                 let indices = patch.indices();
-                if which % 3 > 0 {
+                if which % 3 > 0 && !keeps_place {
                     patch.positions.iter_mut().for_each(|p| *p = turn * *p + 0.5 * by);
                 }
                 if which % 3 < 2 {
                     patch.scale = if pcg.below(4) == 0 { 0.0 } else { pcg.within(0.2, 3.0) };
                 }
-                let update = MeshUpdate::new(id).moved(&patch.positions, &indices).scaled(patch.scale);
-                edits.update_mesh(&update)?;
+                if moves && !keeps_place {
+                    patch.move_at_random(pcg);
+                }
+                let update = MeshUpdate::new(id).scaled(patch.scale);
+                edits.update_mesh(&match &patch.end {
+                    _ if keeps_place => update,
+                    Some(end) => update.moving(&patch.positions, end, &indices),
+                    None => update.moved(&patch.positions, &indices),
+                })?;
             }
             8 => {
                 let Some(id) = self.patches.keys().nth(nth(self.patches.len())).copied() else { return Ok(()) };

@@ -206,49 +206,39 @@ fn lamp<'a>(positions: &'a [Vec3; 3], end: Option<&'a [Vec3; 3]>) -> Mesh<'a> {
     end.map_or(mesh, |end| mesh.moving_to(end))
 }
 
-/// Where edits take away half of what stands still and add something else, what moves goes on as in a new build, and is
-/// refused if it is edited itself.
+/// Edits that take away, add, begin, change and end motion leave the lights of a new build, at all times.
 #[test]
-fn edits_leave_what_moves() {
+fn edits_move_what_they_are_told_to() {
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
     let place = |x: f32| corners.map(|corner| corner + Vec3::new(x, 0.3 * x, 2.0));
+    let places = [-2.0, -1.0, 0.0, 1.0, 2.0, 3.0].map(place);
     let shift = |x: f32| Affine3A::from_translation(Vec3::new(x, -1.0, 1.0));
-    // Some move and some stand still; `is_edited` leaves out what edits remove, and has what they add.
-    let build = |is_edited: bool| {
+    let instance = |object, [start, end]: [f32; 2]| Instance::new(object, shift(start)).moving_to(shift(end));
+    // Start and end of each light.
+    let build = |meshes: &[[usize; 2]], instances: &[[f32; 2]]| {
         let mut builder = LightSampler::builder();
         let object = builder.add_object(&[lamp(&corners, None)]).expect("a valid object");
-        let places = [0.0, 1.0, 2.0, 3.0].map(place);
-        let added = if is_edited { place(-2.0) } else { places[1] };
-        let meshes = [lamp(&places[0], Some(&places[2])), lamp(&added, None), lamp(&places[3], Some(&places[1]))];
-        for mesh in &meshes {
-            builder.add_mesh(mesh).expect("a valid mesh");
+        for &[start, end] in meshes {
+            builder.add_mesh(&lamp(&places[start], Some(&places[end]))).expect("a valid mesh");
         }
-        let still = if is_edited { -1.0 } else { 1.0 };
-        builder.add_instance(Instance::new(object, shift(still))).expect("a valid instance");
-        builder.add_instance(Instance::new(object, shift(2.0)).moving_to(shift(-2.0))).expect("a valid instance");
+        for ends in instances {
+            builder.add_instance(instance(object, *ends)).expect("a valid instance");
+        }
         (builder.build().expect("few lights"), object)
     };
-    let (mut edited, object) = build(false);
-    let (fresh, _) = build(true);
+    let (mut edited, object) = build(&[[0, 1], [2, 2], [3, 4], [5, 5]], &[[0.0, 1.0], [2.0, 2.0], [-1.0, 0.5]]);
+    let (fresh, _) = build(&[[3, 3], [2, 5], [1, 0], [5, 5]], &[[0.5, 0.5], [2.0, -2.0], [-1.0, 1.5]]);
+    let (mesh, number) = (MeshId::from_index, InstanceId::from_index);
     let mut edits = edited.edit();
-    let (moving, still) = (MeshId::from_index(0), MeshId::from_index(1));
-    edits.remove_mesh(still).expect("it stands still");
-    edits.add_mesh(&lamp(&place(-2.0), None)).expect("a valid mesh");
-    let instance = Instance::new(object, shift(-1.0));
-    edits.set_instance(InstanceId::from_index(0), instance).expect("it stands still");
-    assert_eq!(
-        message(edits.remove_mesh(moving)),
-        "mesh 0 moves while the shutter is open, which only a new build can begin, change or end"
-    );
-    for text in [
-        message(edits.update_mesh(&MeshUpdate::new(moving).scaled(2.0))),
-        message(edits.add_mesh(&lamp(&place(0.0), Some(&place(1.0))))),
-        message(edits.set_instance(InstanceId::from_index(0), instance.moving_to(shift(1.0)))),
-        message(edits.add_instance(instance.moving_to(shift(1.0)))),
-        message(edits.remove_instance(InstanceId::from_index(1))),
-    ] {
-        assert!(text.contains("moves while the shutter is open"), "{text}");
-    }
+    edits.remove_mesh(mesh(0)).expect("it is there");
+    edits.add_mesh(&lamp(&places[1], Some(&places[0]))).expect("a valid mesh");
+    edits.update_mesh(&MeshUpdate::new(mesh(1)).moving(&places[2], &places[5], &[[0, 1, 2]])).expect("it begins");
+    edits.update_mesh(&MeshUpdate::new(mesh(2)).moved(&places[3], &[[0, 1, 2]])).expect("it ends");
+    edits.update_mesh(&MeshUpdate::new(mesh(2)).scaled(1.0)).expect("its motion has ended before");
+    edits.remove_instance(number(0)).expect("it is there");
+    edits.set_instance(number(1), instance(object, [2.0, -2.0])).expect("it begins");
+    edits.set_instance(number(2), instance(object, [-1.0, 1.5])).expect("it changes");
+    edits.add_instance(instance(object, [0.5, 0.5])).expect("a valid instance");
     edits.apply().expect("a valid batch");
     let words = aligned(&edited.to_bytes());
     let loaded = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
@@ -264,4 +254,44 @@ fn edits_leave_what_moves() {
         let limit = 4.9 * (a.error() + b.error()) + 1e-6;
         assert!((a.mean() - b.mean()).abs() <= limit, "{x:?}: {} and {}", a.mean(), b.mean());
     }
+    // What no longer moves takes no memory: the ends of two triangles and two transforms.
+    let before = edited.bytes().lights;
+    let mut edits = edited.edit();
+    for i in [1, 4] {
+        edits.remove_mesh(mesh(i)).expect("it is there");
+    }
+    for i in [1, 2] {
+        edits.remove_instance(number(i)).expect("it is there");
+    }
+    edits.apply().expect("a valid batch");
+    assert_eq!(edited.light_count(), 3);
+    let ends = 2 * (size_of::<[Vec3; 3]>() + size_of::<[Vec3; 4]>());
+    assert!(edited.bytes().lights + ends <= before, "{} bytes, and {before} before", edited.bytes().lights);
+}
+
+/// What is wrong with the motion in an edit is an error, and changes nothing.
+#[test]
+fn impossible_motion_is_refused_in_edits() {
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let mut builder = LightSampler::builder();
+    let object = builder.add_object(&[lamp(&corners, None)]).expect("a valid object");
+    builder.add_mesh(&lamp(&corners, None)).expect("a valid mesh");
+    builder.add_instance(Instance::new(object, Affine3A::IDENTITY)).expect("a valid instance");
+    let mut lights = builder.build().expect("few lights");
+    drop(lights.edit());
+    let bytes = lights.to_bytes();
+    let mirrored = Instance::new(object, Affine3A::IDENTITY).moving_to(Affine3A::from_scale(-Vec3::ONE));
+    let far = corners.map(|corner| corner + Vec3::splat(2e9));
+    let mut edits = lights.edit();
+    let update = MeshUpdate::new(MeshId::from_index(0));
+    for (text, part) in [
+        (message(edits.add_instance(mirrored)), "time at which the transform cannot be inverted"),
+        (message(edits.set_instance(InstanceId::from_index(0), mirrored)), "instance 0"),
+        (message(edits.add_mesh(&lamp(&corners, Some(&far)))), "must be finite and within 1e9"),
+        (message(edits.update_mesh(&update.moving(&corners, &corners[..2], &[[0, 1, 2]]))), "2 vertices at the end"),
+    ] {
+        assert!(text.contains(part), "{text}");
+    }
+    edits.apply().expect("an empty batch");
+    assert!(lights.to_bytes() == bytes, "an error changes something");
 }
