@@ -15,8 +15,9 @@ use crate::world::World;
 
 /// Scenes in which fanlight also learns what walls hide; the last one has no walls.
 const LEARNED: [&str; 4] = ["two-rooms", "building", "building-windows", "cornell"];
-/// Rays that it learns by. The time that they take is part of the time of every image.
-const LEARNING_RAYS: u64 = 100_000;
+/// Rays that it learns by, for each second of an image: about a twentieth of the time, which is part of that of every
+/// image.
+const LEARNING_RAYS: f64 = 10_000.0;
 /// Share of the time from which on errors are noted.
 const CURVE: f64 = 1.0 / 16.0;
 
@@ -47,16 +48,16 @@ pub(crate) fn measure(
     reference: &Reference,
     args: &Args,
 ) -> Result<Vec<Row>, Error> {
-    let rays = if LEARNED.contains(&scene) { LEARNING_RAYS } else { 0 };
+    let rays = if LEARNED.contains(&scene) { (LEARNING_RAYS * args.seconds) as u64 } else { 0 };
     let methods = Method::all(world, bounces, rays)?;
     let costs = cost::measure(world, &methods, bounces);
     let mut outcomes: Vec<Outcome> = methods.iter().map(|_| Outcome::default()).collect();
     for seed in 0..args.seeds {
-        let images = images(world, &methods, bounces, u64::from(seed), args.seconds, reference);
+        let images = images(world, &methods, bounces, u64::from(seed), reference, args);
         for ((method, outcome), image) in methods.iter().zip(&mut outcomes).zip(&images) {
             outcome.samples.push(f64::from(image.film.samples()));
             outcome.seconds.push(image.seconds);
-            outcome.errors.push(reference.rel_mse(&image.film.image()));
+            outcome.errors.push(error(&image.film, reference, args));
             outcome.curves.push(image.curve.clone());
             if let Some(folder) = args.picture.as_ref().filter(|_| seed == 0) {
                 std::fs::create_dir_all(folder)?;
@@ -119,9 +120,10 @@ fn images(
     methods: &[Method],
     bounces: u32,
     seed: u64,
-    seconds: f64,
     reference: &Reference,
+    args: &Args,
 ) -> Vec<Progress> {
+    let seconds = args.seconds;
     let start = |i: usize| Progress {
         film: Film::new(),
         random: Pcg32::new(seed, i as u64),
@@ -141,7 +143,12 @@ fn images(
         // Once for each halving of the time.
         let is_later = image.curve.last().is_none_or(|[last, _]| image.seconds >= 1.9 * last);
         if image.seconds >= seconds || image.seconds >= CURVE * seconds && is_later {
-            image.curve.push([image.seconds, reference.rel_mse(&image.film.image())]);
+            image.curve.push([image.seconds, error(&image.film, reference, args)]);
         }
     }
+}
+
+/// Returns the error of an image.
+fn error(film: &Film, reference: &Reference, args: &Args) -> f64 {
+    if args.by_variance { reference.predicted(film) } else { reference.rel_mse(&film.image()) }
 }

@@ -5,8 +5,8 @@
 //! the ray crosses.
 
 use fanlight::{
-    Effort, Environment, Filter, Glossy, Hit, LightSample, LightSampler, Mesh, MeshId, PointSampler, SampledLight,
-    ShadingPoint, Texture, TriangleId, Visibility, Weight, Wrap,
+    Effort, Environment, Filter, Glossy, Hit, LightSample, LightSampler, LightSamplerView, Mesh, MeshId, PointSampler,
+    SampledLight, ShadingPoint, Texture, TriangleId, Visibility, Weight, Wrap,
 };
 use glam::Vec3;
 
@@ -23,7 +23,7 @@ const NOWHERE: ShadingPoint = ShadingPoint::volume(Vec3::splat(f32::NAN));
 
 /// The lights of a scene.
 pub(super) struct Fanlight {
-    lights: LightSampler,
+    lights: LightSamplerView<'static>,
     /// What the sampler calls each triangle of the emitters.
     ids: Vec<TriangleId>,
     /// The number of the first triangle of each emitter among all of them.
@@ -34,8 +34,6 @@ pub(super) struct Fanlight {
     tells_lobes: bool,
     /// How much a call may do at the first vertex of a path, and at later ones.
     efforts: [Effort; 2],
-    /// What walls hide, if that has been learned.
-    visibility: Option<Visibility>,
 }
 
 impl Fanlight {
@@ -72,14 +70,15 @@ impl Fanlight {
             *next += emitter.mesh.indices.len() as u32;
             Some(first)
         });
+        // A frame's view, as a renderer keeps it. The few scenes of a run stay in memory until its end.
+        let lights: &'static LightSampler = Box::leak(Box::new(builder.build()?));
         Ok(Self {
-            lights: builder.build()?,
+            lights: lights.as_view(),
             ids: ids.collect(),
             starts: starts.collect(),
             open_sky,
             tells_lobes: true,
             efforts: [Effort::Full; 2],
-            visibility: None,
         })
     }
 
@@ -109,8 +108,9 @@ impl Fanlight {
             };
             f32::from(u8::from(is_seen))
         };
-        let visibility = Visibility::learn(&self.lights.as_view(), rays, point, transmittance)?;
-        self.visibility = Some(visibility);
+        let visibility: &'static Visibility =
+            Box::leak(Box::new(Visibility::learn(&self.lights, rays, point, transmittance)?));
+        self.lights = self.lights.with_visibility(visibility.as_view())?;
         Ok(self)
     }
 
@@ -138,12 +138,7 @@ impl Lighting for Fanlight {
 
     #[inline]
     fn at(&self, vertex: &Vertex) -> Here<'_> {
-        let point = self.shading_point(vertex);
-        let known = self.visibility.as_ref().and_then(|visibility| self.lights.with_visibility(visibility).ok());
-        match known {
-            Some(lights) => Here { fanlight: self, lights: lights.at(&point) },
-            None => Here { fanlight: self, lights: self.lights.at(&point) },
-        }
+        Here { fanlight: self, lights: self.lights.at(&self.shading_point(vertex)) }
     }
 }
 
