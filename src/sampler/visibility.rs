@@ -105,8 +105,8 @@ impl<'a> LightSamplerView<'a> {
     #[inline(always)]
     pub(super) fn region(&self, x: &ShadingPoint) -> Option<RegionFactors<'a>> {
         match &self.visibility {
-            None => None,
-            Some(visibility) => visibility.at(x),
+            Some(visibility) if !visibility.is_empty() => visibility.at(x),
+            _ => None,
         }
     }
 }

@@ -22,9 +22,9 @@ use crate::tlas::{FACTORS as LANES, TlasView};
 
 /// Number of reports that the expectation counts as.
 ///
-/// *Measured* on `building` (docs/CONSTANTS.md). Larger: a lane needs more reports to differ from what surrounds it.
-/// Smaller: few reports decide, and what they have missed by chance becomes noise.
-const PRIOR: f32 = 2.0;
+/// *Measured* on `building` and `two-rooms` (docs/CONSTANTS.md). Larger: a lane needs more reports to differ from what
+/// surrounds it. Smaller: few reports decide, and what they have missed by chance becomes noise.
+const PRIOR: f32 = 8.0;
 
 /// Levels of the tree over regions from one prior to the next. *Measured* on `building` (docs/CONSTANTS.md).
 ///
@@ -42,6 +42,13 @@ const FLOOR: f32 = 5e-5;
 ///
 /// *Measured* on `building` (docs/CONSTANTS.md). Larger: a smaller table. Smaller: entries that change next to nothing.
 const LEAST_GAIN: f32 = 5e-4;
+
+/// Least factor by which the entries of a region lower the expected square of an estimate: those of a region where all
+/// lights are hidden alike are left out, since a call with a table costs about a tenth more than one without.
+///
+/// *Measured* (docs/CONSTANTS.md). Larger: more regions work as without a table. Smaller: more calls pay for a table
+/// that gains nothing.
+const LEAST_SAVING: f32 = 1.02;
 
 /// Number of reports that the prior counts as of how often lanes are asked about. *Measured* on `building`
 /// (docs/CONSTANTS.md).
@@ -296,8 +303,23 @@ impl Distiller<'_> {
         counts.iter().filter(|count| self.parent(key_of(count.slot)).is_none()).map(|count| count.asked).sum()
     }
 
+    /// Returns what the expected square of an estimate is divided by if lanes are chosen by their factors: one plus the
+    /// relative variance of the factors of all lanes without lanes below them, by how often they are asked about.
+    fn saving(&self, beliefs: &Beliefs) -> f32 {
+        let mut above: Vec<LaneKey> = beliefs.nodes().filter_map(|lanes| self.parent(key_of(lanes[0].slot))).collect();
+        above.sort_unstable();
+        let last = beliefs.slots.iter().filter(|belief| above.binary_search(&belief.slot).is_err());
+        let [mass, share, factor] = last.fold([0.0; 3], |[mass, share, factor], b| {
+            [mass + b.mass, share + b.mass * b.share, factor + b.mass * b.factor]
+        });
+        if factor > 0.0 { mass * share / (factor * factor) } else { 1.0 }
+    }
+
     /// Makes the entries of a region.
     fn add_entries(&self, region: u32, counts: &[Count], beliefs: &Beliefs, entries: &mut Vec<FactorEntry>) {
+        if self.saving(beliefs) < LEAST_SAVING {
+            return;
+        }
         let all = self.asked(counts);
         let first = entries.len();
         for of_node in beliefs.nodes() {

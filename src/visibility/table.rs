@@ -198,6 +198,12 @@ impl<'a> VisibilityView<'a> {
         }
     }
 
+    /// Whether nothing is known of any region, or nothing that would gain anything.
+    #[inline(always)]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+
     /// Returns the entries of the region that a shading point is in.
     #[inline]
     pub(crate) fn at(&self, x: &ShadingPoint) -> Option<RegionFactors<'a>> {

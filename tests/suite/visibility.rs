@@ -236,7 +236,7 @@ fn order_and_threads_do_not_matter() {
                 };
                 let at = view.at(&x);
                 if let Some(sample) = at.sample(pcg.cube()) {
-                    parts[i as usize % threads].report(&at, &sample, 0.3 + 0.6 * wall(&x, &sample));
+                    parts[i as usize % threads].report(&at, &sample, 0.1 + 0.8 * wall(&x, &sample));
                 }
             }
             if reversed {
