@@ -252,10 +252,10 @@ impl<'a> LightCollection<'a> {
         &self.indices[start..end]
     }
 
-    /// Returns the vertices of the triangles of a mesh at the end of the shutter interval: those of no triangle if it
-    /// stands still.
+    /// Returns the vertices of the triangles of a mesh at the end of the shutter interval; empty if it stands still.
     pub(super) fn ends(&self, mesh: u32) -> &[EndVertices] {
-        self.motion.mesh(self.meshes[mesh as usize])
+        // The place of a mesh without triangles is that of another one.
+        if self.mesh(mesh).is_empty() { &[] } else { self.motion.mesh(self.meshes[mesh as usize]) }
     }
 
     /// Returns a light by its index among those that may emit: first the triangles, then the lamps, then the instances.

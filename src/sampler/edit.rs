@@ -55,7 +55,8 @@ use crate::record::{InstanceId, LightId, MeshId, TextureId};
 /// - The first batch of a sampler takes about the time of a [`refit`](LightSampler::refit).
 /// - A textured mesh takes the time to build its trees, as in the builder.
 /// - Edits of [`DistantLight`](crate::DistantLight)s take a time in proportion to the number of all of these.
-/// - A batch that changes where meshes or instances move takes a time in proportion to the number of all that move.
+/// - A batch that adds, replaces or removes instances that move, or adds, moves or removes meshes that do, takes a time
+///   in proportion to the number of all that move.
 /// - A change of a mesh takes a time in proportion to the number of its triangles.
 ///
 /// Places of what was removed are used again, so that memory is bounded by what a sampler has held at a time, however

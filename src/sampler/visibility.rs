@@ -355,13 +355,14 @@ impl Visibility {
     /// a random surface, or a list that is repeated. The regions of the table are where these points are.
     /// `transmittance` says which share, in `[0, 1]`, of the light of a sample gets to such a point: for a sample on a
     /// portal or of the environment, of the light that comes along its direction. Each of the `rays` asks for it once,
-    /// many of them for samples drawn with what the ones before have found. One hundred rays for each region of a
-    /// square meter or so make a useful table, one thousand a good one.
+    /// many of them for samples drawn with what the ones before have found. One hundred rays for each room make a useful
+    /// table, a few thousand a good one.
     ///
     /// The result does not depend on the number of threads. With the feature `rayon` both functions are called by
     /// several.
     ///
-    /// A tree without nodes (a single light) has nothing to learn, and the table is empty.
+    /// A tree without nodes (a single light) has nothing to learn, and the table is empty, as it is where all lights are
+    /// seen.
     ///
     /// # Errors
     ///

@@ -43,12 +43,18 @@ const FLOOR: f32 = 5e-5;
 /// *Measured* on `building` (docs/CONSTANTS.md). Larger: a smaller table. Smaller: entries that change next to nothing.
 const LEAST_GAIN: f32 = 5e-4;
 
-/// Least factor by which the entries of a region lower the expected square of an estimate: those of a region where all
-/// lights are hidden alike are left out, since a call with a table costs about a tenth more than one without.
+/// Least number by which the entries of a region divide the expected square of an estimate: where all lights are seen
+/// alike, entries are left out, since a call with a table costs about a tenth more than one without.
 ///
 /// *Measured* (docs/CONSTANTS.md). Larger: more regions work as without a table. Smaller: more calls pay for a table
 /// that gains nothing.
 const LEAST_SAVING: f32 = 1.02;
+
+/// Mean factor from which on a region may be without entries. *Chosen*: below it, distant lights and the environment,
+/// which compete with the lights of the tree, need to know that these are hidden.
+///
+/// Larger: more regions have entries. Smaller: lights that are all hidden take samples from what is seen.
+const SEEN: f32 = 0.9;
 
 /// Number of reports that the prior counts as of how often lanes are asked about. *Measured* on `building`
 /// (docs/CONSTANTS.md).
@@ -303,21 +309,21 @@ impl Distiller<'_> {
         counts.iter().filter(|count| self.parent(key_of(count.slot)).is_none()).map(|count| count.asked).sum()
     }
 
-    /// Returns what the expected square of an estimate is divided by if lanes are chosen by their factors: one plus the
-    /// relative variance of the factors of all lanes without lanes below them, by how often they are asked about.
-    fn saving(&self, beliefs: &Beliefs) -> f32 {
+    /// Whether entries are worth their time. The expected square of an estimate is divided by one plus the relative
+    /// variance of the factors of all lanes without lanes below them, by how often they are asked about.
+    fn pays(&self, beliefs: &Beliefs) -> bool {
         let mut above: Vec<LaneKey> = beliefs.nodes().filter_map(|lanes| self.parent(key_of(lanes[0].slot))).collect();
         above.sort_unstable();
         let last = beliefs.slots.iter().filter(|belief| above.binary_search(&belief.slot).is_err());
         let [mass, share, factor] = last.fold([0.0; 3], |[mass, share, factor], b| {
             [mass + b.mass, share + b.mass * b.share, factor + b.mass * b.factor]
         });
-        if factor > 0.0 { mass * share / (factor * factor) } else { 1.0 }
+        mass * share >= LEAST_SAVING * factor * factor || factor < SEEN * mass
     }
 
     /// Makes the entries of a region.
     fn add_entries(&self, region: u32, counts: &[Count], beliefs: &Beliefs, entries: &mut Vec<FactorEntry>) {
-        if self.saving(beliefs) < LEAST_SAVING {
+        if !self.pays(beliefs) {
             return;
         }
         let all = self.asked(counts);

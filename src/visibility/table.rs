@@ -137,7 +137,7 @@ impl Visibility {
         self.view().to_bytes()
     }
 
-    /// Returns the number of regions that anything is known of.
+    /// Returns the number of regions that have entries: those where anything is known that would gain anything.
     #[must_use]
     pub fn region_count(&self) -> usize {
         self.view().region_count()
@@ -151,7 +151,7 @@ impl<'a> VisibilityView<'a> {
         self.byte_size() + size_of::<VisibilityHeader>()
     }
 
-    /// Returns the number of regions that anything is known of.
+    /// Returns the number of regions that have entries: those where anything is known that would gain anything.
     #[must_use]
     pub fn region_count(&self) -> usize {
         self.starts.len().saturating_sub(1)

@@ -15,8 +15,8 @@ use crate::world::World;
 
 /// Scenes in which fanlight also learns what walls hide; the last one has no walls.
 const LEARNED: [&str; 4] = ["two-rooms", "building", "building-windows", "cornell"];
-/// Rays that it learns by, for each second of an image: about a twentieth of the time, which is part of that of every
-/// image.
+/// Rays that it learns by, for each second of an image. They take about a twentieth of an image's time, and count as
+/// part of it.
 const LEARNING_RAYS: f64 = 10_000.0;
 /// Share of the time from which on errors are noted.
 const CURVE: f64 = 1.0 / 16.0;
@@ -55,6 +55,9 @@ pub(crate) fn measure(
     for seed in 0..args.seeds {
         let images = images(world, &methods, bounces, u64::from(seed), reference, args);
         for ((method, outcome), image) in methods.iter().zip(&mut outcomes).zip(&images) {
+            if args.by_variance && image.film.samples() < 2 {
+                return Err("an image of one sample a pixel has no variance: it needs more --seconds".into());
+            }
             outcome.samples.push(f64::from(image.film.samples()));
             outcome.seconds.push(image.seconds);
             outcome.errors.push(error(&image.film, reference, args));
@@ -142,7 +145,8 @@ fn images(
         image.seconds += thread_seconds() - before;
         // Once for each halving of the time.
         let is_later = image.curve.last().is_none_or(|[last, _]| image.seconds >= 1.9 * last);
-        if image.seconds >= seconds || image.seconds >= CURVE * seconds && is_later {
+        let has_error = !args.by_variance || image.film.samples() > 1;
+        if has_error && (image.seconds >= seconds || image.seconds >= CURVE * seconds && is_later) {
             image.curve.push([image.seconds, error(&image.film, reference, args)]);
         }
     }

@@ -105,7 +105,7 @@ impl EditState {
             edit.store.unit = *unit;
             edit.fit_all();
         }
-        // 4. One light after the other, where motion is known.
+        // 4. One light after the other, now that motion is known.
         motion::update(edit.store.lights, &collection, (&lamps, &meshes, &instances));
         let known = edit.store.lights.view().extras().distants();
         let distants = known.iter().map(|light| (light.number(), *light)).collect();

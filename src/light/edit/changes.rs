@@ -57,7 +57,7 @@ pub(super) struct MeshChange {
 /// New vertices of all triangles of a mesh.
 pub(super) struct NewVertices {
     pub(super) start: Vec<Triangle>,
-    /// Those at the end of the shutter interval; of no triangle if the mesh stands still.
+    /// Those at the end of the shutter interval; empty if the mesh stands still.
     pub(super) end: Vec<EndVertices>,
 }
 

@@ -26,7 +26,12 @@ impl MeshChange {
 pub(super) fn update(lights: &mut Lights, collection: &LightCollection<'_>, (_, meshes, instances): Changes<'_>) {
     let motion = lights.view().extras().motion();
     let ends = |(&number, change): (&u32, _)| {
-        let (first, ends) = (lights.meshes[number as usize], MeshChange::ends(change, collection)?);
+        let [first, end] = [number, number + 1].map(|mesh| lights.meshes[mesh as usize]);
+        let ends = MeshChange::ends(change, collection)?;
+        if first == end {
+            // No triangles, so that the place is that of another mesh.
+            return None;
+        }
         (!ends.is_empty() || motion.moves_mesh(first)).then(|| (first, ends.to_vec()))
     };
     let meshes: Vec<(u32, Vec<EndVertices>)> = meshes.iter().filter_map(ends).collect();

@@ -118,7 +118,7 @@ impl<'a> PlacedObject<'a> {
         Self { end, time, ..self }
     }
 
-    /// Returns the instance with this transform at the end of the interval, at its start.
+    /// Returns the instance at the start of the interval, with this transform at its end.
     pub(in crate::light) fn moving_to(self, end: Option<&'a EndColumns>) -> Self {
         Self { end, time: 0.0, ..self }
     }

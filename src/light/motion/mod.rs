@@ -178,8 +178,7 @@ impl MotionCollection {
         }
     }
 
-    /// Returns the vertices of the triangles of a mesh by the number of its first one: those of no triangle if it
-    /// stands still.
+    /// Returns the vertices of the triangles of a mesh by the number of its first one; empty if it stands still.
     pub(super) fn mesh(&self, first: u32) -> &[EndVertices] {
         self.meshes.get(&first).map_or(&[], |triangles| triangles)
     }

@@ -71,7 +71,7 @@ impl<'a> MovingTriangle<'a> {
         Self { record, end, time: time.into() }
     }
 
-    /// Returns the triangle that moves from the vertices of a record to these, at the start of the interval.
+    /// Returns, at the start of the interval, the triangle that moves from the vertices of a record to these.
     pub(in crate::light) fn between(record: &'a LightTriangle, end: &'a EndVertices) -> Self {
         Self { record, end, time: 0.0 }
     }

@@ -295,3 +295,41 @@ fn impossible_motion_is_refused_in_edits() {
     edits.apply().expect("an empty batch");
     assert!(lights.to_bytes() == bytes, "an error changes something");
 }
+
+/// A mesh without triangles is at the place of the next one, whose motion it must leave alone.
+#[test]
+fn edits_of_meshes_without_triangles_move_nothing() {
+    let place = |x: f32| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|corner| corner + Vec3::new(x, 0.0, 2.0));
+    let places = [0.0, 4.0, 8.0, 12.0].map(place);
+    let nothing = Mesh::emitter(&[], &[]);
+    let mesh = MeshId::from_index;
+    let mut builder = LightSampler::builder();
+    for added in [lamp(&places[0], None), nothing, lamp(&places[1], None)] {
+        builder.add_mesh(&added).expect("a valid mesh");
+    }
+    let mut lights = builder.build().expect("few lights");
+    let x = ShadingPoint::volume(Vec3::ZERO).at_time(1.0);
+    let positions = |lights: &LightSampler| {
+        let at = lights.at(&x);
+        (0..64_u8).filter_map(|i| at.sample([f32::from(i) / 64.0, 0.3, 0.6])).map(|s| s.position.x).collect::<Vec<_>>()
+    };
+    let mut edits = lights.edit();
+    edits.update_mesh(&MeshUpdate::new(mesh(2)).moving(&places[1], &places[2], &[[0, 1, 2]])).expect("it begins");
+    edits.apply().expect("a valid batch");
+    let mut edits = lights.edit();
+    edits.update_mesh(&MeshUpdate::new(mesh(1)).moved(&[], &[])).expect("it has no triangles");
+    edits.remove_mesh(mesh(0)).expect("it is there");
+    edits.apply().expect("a valid batch");
+    let found = positions(&lights);
+    assert!(found.len() > 50 && found.iter().all(|x| (8.0..=9.0).contains(x)), "{found:?}");
+    let mut edits = lights.edit();
+    edits.remove_mesh(mesh(1)).expect("it is there");
+    edits.apply().expect("a valid batch");
+    let mut edits = lights.edit();
+    assert_eq!(edits.add_mesh(&nothing), Ok(mesh(1)));
+    assert_eq!(edits.add_mesh(&lamp(&places[0], Some(&places[3]))), Ok(mesh(0)));
+    edits.apply().expect("a valid batch");
+    let found = positions(&lights);
+    let [near, far] = [8.0..=9.0, 12.0..=13.0].map(|place| found.iter().filter(|x| place.contains(*x)).count());
+    assert!(near > 20 && far > 5 && near + far == found.len(), "{found:?}");
+}
