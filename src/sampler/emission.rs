@@ -77,8 +77,9 @@ impl EmissionSample {
 pub struct Emission<'a> {
     scene: LightScene<'a>,
     directions: DirectionDistribution,
-    /// Probabilities of a ray that does not depend on the direction, and of one from the environment's image.
-    shares: [f64; 2],
+    /// Probabilities of a ray that does not depend on the direction, and of one from the environment's image, among all
+    /// rays that are not of distant lights.
+    local_shares: [f64; 2],
     /// The rays of distant lights, and their probability.
     distant: Option<(DistantRays, f64)>,
 }
@@ -103,7 +104,7 @@ impl<'a> Emission<'a> {
         let through = if is_image { directions.total() / mean } else { 0.0 };
         let total = f64::from(diffuse) + f64::from(through);
         let share = |power: f32| if power > 0.0 { f64::from(power) / total } else { 0.0 };
-        Self { scene, directions, shares: [share(diffuse), share(through)], distant: None }
+        Self { scene, directions, local_shares: [share(diffuse), share(through)], distant: None }
     }
 
     /// Sets the time at which light leaves, in the shutter interval from 0 to 1; 0 until this sets it, and for NaN. A
@@ -120,13 +121,12 @@ impl<'a> Emission<'a> {
     ///
     /// The density is per area perpendicular to the direction and, if the light has an extent, per solid angle. So the
     /// power of a ray is radiance over density, or irradiance over density for a light without an extent. Without
-    /// distant lights, or with a radius that is not positive, nothing changes.
+    /// distant lights, or with a radius that is not positive, nothing changes; another ball takes the place of the one
+    /// before.
     #[must_use]
     pub fn within(mut self, center: Vec3, radius: f32) -> Self {
         let Some(rays) = DistantRays::new(&self.scene.lights, center, radius) else { return self };
-        let others: f64 = self.power();
-        let share = rays.power() / (rays.power() + others);
-        self.shares = self.shares.map(|other| other * (1.0 - share));
+        let share = rays.power() / (rays.power() + self.power());
         self.distant = Some((rays, share));
         self
     }
@@ -134,12 +134,19 @@ impl<'a> Emission<'a> {
     /// Returns the power of all that is somewhere.
     fn power(&self) -> f64 {
         let diffuse = PI * outgoing_of_all(&self.scene, &Outgoing::Diffuse);
-        let [diffuse_share, through_share] = self.shares;
+        let [diffuse_share, through_share] = self.local_shares;
         let diffuse = f64::from(diffuse) * f64::from(self.scene.lights.energy);
         let mean = f64::from(self.scene.environment.mean_without_features());
         let through = f64::from(self.directions.total()) * f64::from(self.scene.lights.energy) / mean;
         let counted = |share: f64, power: f64| if share > 0.0 { power } else { 0.0 };
         counted(diffuse_share, diffuse) + counted(through_share, through)
+    }
+
+    /// Returns the probabilities of a ray that does not depend on the direction, and of one from the environment's
+    /// image.
+    fn shares(&self) -> [f64; 2] {
+        let others = self.distant.as_ref().map_or(1.0, |(_, share)| 1.0 - share);
+        self.local_shares.map(|share| share * others)
     }
 
     /// Draws a ray of light. `u` is uniform in `[0, 1)⁵`: the first number chooses the light, the next two the point on
@@ -151,18 +158,19 @@ impl<'a> Emission<'a> {
     pub fn sample(&self, u: [f32; 5]) -> Option<EmissionSample> {
         let [mut choice, b1, b2, d1, d2] = variates(u);
         if let Some((rays, share)) = &self.distant {
-            if pick_pair([*share as f32, 1.0 - *share as f32], &mut choice) == 0 {
+            // The difference before it is rounded: after, a small share of the other lights would be rounding alone.
+            if pick_pair([*share as f32, (1.0 - *share) as f32], &mut choice) == 0 {
                 return rays.sample(&self.scene.lights, *share, choice.value(), [b1, b2], [d1, d2]);
             }
         }
-        if self.shares == [0.0; 2] {
+        if self.local_shares == [0.0; 2] {
             return None;
         }
-        match pick_pair(self.shares.map(|share| share as f32), &mut choice) {
+        match pick_pair(self.local_shares.map(|share| share as f32), &mut choice) {
             0 => self.sample_diffuse(choice, [b1, b2], [d1, d2]),
             _ => {
                 let (towards, pdf) = self.directions.sample(&self.scene.environment, [d1, d2])?;
-                self.sample_beam(-towards, self.shares[1] * pdf, choice, [b1, b2])
+                self.sample_beam(-towards, self.shares()[1] * pdf, choice, [b1, b2])
             }
         }
     }
@@ -258,7 +266,7 @@ impl<'a> Emission<'a> {
 
     fn density(&self, point: LightPoint, direction: Vec3, directions: f64) -> f64 {
         if is_directional(&self.scene, point.leaf) {
-            self.shares[1] * directions * self.beam_density(point, direction)
+            self.shares()[1] * directions * self.beam_density(point, direction)
         } else {
             self.diffuse_density(point, direction)
         }
@@ -273,7 +281,7 @@ impl<'a> Emission<'a> {
             position: position.as_vec3(),
             normal,
             direction,
-            pdf: to_positive(self.shares[0] * pmf * pdf),
+            pdf: to_positive(self.shares()[0] * pmf * pdf),
             pmf: to_positive(pmf),
         })
     }
@@ -281,7 +289,7 @@ impl<'a> Emission<'a> {
     fn diffuse_density(&self, point: LightPoint, direction: Vec3) -> f64 {
         match self.scene.lights.emission_pdf(point, direction) {
             0.0 => 0.0,
-            pdf => self.shares[0] * self.scene.pmf_outgoing(point.leaf, &Outgoing::Diffuse) * pdf,
+            pdf => self.shares()[0] * self.scene.pmf_outgoing(point.leaf, &Outgoing::Diffuse) * pdf,
         }
     }
 

@@ -10,8 +10,8 @@ use crate::common::pcg::Pcg32;
 use crate::common::scene::with_lobe;
 use crate::common::statistics::{Mean, chi_square, sidak};
 use fanlight::{
-    DistantLight, Environment, LightId, LightSample, LightSampler, LightSamplerView, Mesh, PointSampler, Receiver,
-    SampledLight, ShadingPoint, SphereLight, Splitting,
+    DistantLight, Emission, Environment, LightId, LightSample, LightSampler, LightSamplerView, Mesh, PointLight,
+    PointSampler, Receiver, SampledLight, ShadingPoint, SphereLight, Splitting,
 };
 use glam::{DVec3, Vec3};
 
@@ -391,6 +391,50 @@ fn photons_bring_what_light_samples_bring() {
     let error = photons.error().hypot(samples.error());
     let (a, b) = (photons.mean(), samples.mean());
     assert!((a - b).abs() < 4.0 * error && error < 0.03 * b, "{a} and {b} ± {error}");
+}
+
+/// Photons of a bulb beside a sun that sends ten million times as much come as often as their density says. The bulb is
+/// behind the very last first numbers.
+#[test]
+fn photons_of_weak_lights_come_beside_strong_ones() {
+    let build = |irradiance| {
+        let mut builder = LightSampler::builder();
+        builder.add_light(PointLight::new(Vec3::Z, 1.0)).expect("a valid light");
+        builder.add_light(DistantLight::new(Vec3::NEG_Z, irradiance)).expect("a valid light");
+        builder.build().expect("two lights")
+    };
+    let bulb = LightId::from_index(0);
+    let share = |emission: &Emission<'_>| f64::from(emission.pdf_light(bulb, Vec3::X)) * 2.0 * TAU;
+    for power in [1e6_f32, 4e6, 1e7, 2e7, 6e7] {
+        let lights = build(power);
+        // In a ball whose section has an area of about 1, the sun's power is its irradiance.
+        let emission = lights.emission().within(Vec3::ZERO, 0.564_189_6);
+        let share = share(&emission);
+        assert!((share * f64::from(power) / (2.0 * TAU) - 1.0).abs() < 1e-3, "{share}");
+        // The bulb's share of the numbers from `1 - steps * step` on.
+        let step = f64::from(f32::EPSILON) / 2.0;
+        let steps = (share / step).ceil() * 2.0;
+        let mut pcg = Pcg32::new(1, 169);
+        let count = 20_000;
+        let mut found = 0;
+        for i in 0..count {
+            let [_, b, c] = pcg.cube();
+            let u = 1.0 - f64::from(i % steps as i32 + 1) * step;
+            let ray = emission.sample([u as f32, b, c, pcg.f32(), pcg.f32()]).expect("both send in all directions");
+            found += i32::from(ray.light.id() == Some(bulb));
+        }
+        let expected = share / (steps * step);
+        let error = (expected * (1.0 - expected) / f64::from(count)).sqrt();
+        let found = f64::from(found) / f64::from(count);
+        assert!((found - expected).abs() < 5.0 * error, "{power}: {found}, expected {expected}");
+    }
+    // The last ball counts, and it alone.
+    let lights = build(10.0);
+    let once = lights.emission().within(Vec3::X, 2.0);
+    let twice = lights.emission().within(Vec3::ZERO, 50.0).within(Vec3::X, 2.0);
+    assert_eq!(once.pdf_light(bulb, Vec3::X), twice.pdf_light(bulb, Vec3::X));
+    let u = [0.999, 0.1, 0.2, 0.3, 0.4];
+    assert_eq!(once.sample(u), twice.sample(u));
 }
 
 #[test]
