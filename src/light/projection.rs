@@ -8,13 +8,14 @@
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use super::profile::{HEADER, ProfileCollection, REACH_MARGIN};
+use super::profile::{HEADER, ProfileCollection, REACH_MARGIN, push_sums};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
 use crate::math;
 use crate::record::{Filter, ProfileId};
 
-/// Most texels along an edge. *Format*: sums over a row are exact enough in single precision for [`LEAST_SHARE`].
+/// Most texels along an edge. *Format*: sums over a row are exact enough in single precision for the least
+/// share of a texel.
 const MOST_TEXELS: usize = 2048;
 
 /// Values of a projection between the header and the texels: tangents of half the angles of view, and the filter.
@@ -26,12 +27,6 @@ const ANGLES: [f32; 2] = [1e-3, 3.1];
 
 /// Range of the tangents of half the angles of view. *Proved*: holds those of [`ANGLES`].
 const TANGENTS: [f32; 2] = [4e-4, 49.0];
-
-/// Least share of a row among all rows, and of a texel in its row, if it is lit. *Proved*: above the rounding of sums
-/// up to 1 to single precision, 6e-8, so that no lit texel is without a share.
-///
-/// Larger: more rays from dark texels.
-const LEAST_SHARE: f64 = 2.4e-7;
 
 /// An image of radiant intensities that a light projects, borrowed from the host.
 ///
@@ -180,18 +175,6 @@ impl ProfileCollection {
         (0..height).for_each(|row| push_sums(&mut self.values, powers(row)));
         self.starts.push(end as u32);
         Ok(ProfileId(self.starts.len() as u32 - 2))
-    }
-}
-
-/// Appends the shares of these powers, added up; of what is lit, none is so small that it vanishes.
-fn push_sums(values: &mut Vec<f32>, powers: impl Iterator<Item = f64> + Clone) {
-    let total: f64 = powers.clone().sum();
-    let share = |power: f64| if power > 0.0 { (power / total).max(LEAST_SHARE) } else { 0.0 };
-    let all: f64 = powers.clone().map(share).sum();
-    let mut sum = 0.0;
-    for power in powers {
-        sum += share(power);
-        values.push(if all > 0.0 { (sum / all).min(1.0) as f32 } else { 0.0 });
     }
 }
 

@@ -238,6 +238,27 @@ fn photons_carry_the_power_of_the_table() {
     }
 }
 
+/// Photons leave everything that is lit, however dim it is beside the rest.
+#[test]
+fn photons_leave_dim_cells() {
+    let mut builder = LightSampler::builder();
+    let table = Profile { vertical: &[0.0, 1.0, 1.1, 3.0], horizontal: &[0.0], intensities: &[1e12, 1e12, 1.0, 1.0] };
+    let profile = builder.add_profile(&table).expect("a valid profile");
+    builder.add_light(ProfileLight::new(Vec3::ZERO, Vec3::Z, profile, 1.0)).expect("a valid lamp");
+    let lights = builder.build().expect("one light");
+    let emission = lights.emission();
+    let dim = |direction: Vec3| direction.z.acos() > 1.1;
+    let pdf = emission.pdf_light(LightId::from_index(0), Vec3::X);
+    assert!(pdf > 0.0);
+    let rays = (1..=64).filter_map(|k| {
+        let last = 1.0 - f32::EPSILON / 2.0 * k as f32;
+        emission.sample([0.3, 0.1, 0.2, last, 0.5])
+    });
+    let found: Vec<_> = rays.filter(|ray| dim(ray.direction)).collect();
+    assert!(!found.is_empty());
+    found.iter().for_each(|ray| assert!((ray.pdf / pdf - 1.0).abs() < 1e-5, "{ray:?}, and not {pdf}"));
+}
+
 /// Every changed word is refused, or harmless; lamps keep their profiles when they move.
 #[test]
 fn profiles_survive_bytes_and_refits() {
