@@ -154,14 +154,15 @@ impl Distances {
         }
         for (power, node) in strongest.into_iter().filter(|(power, _)| *power > 0.0) {
             let toward = scene.environment.feature_axis(node);
-            let mut visited = 0;
+            let mut followed = 0;
             let stretch = self.segment.stretch;
             scene.tlas.meet_strip(&stretch, toward, |leaf| {
-                visited += 1;
-                if visited > MOST_PORTALS || scene.lights.extras().groups_of(leaf) & groups == 0 {
+                if followed == MOST_PORTALS || scene.lights.extras().groups_of(leaf) & groups == 0 {
                     return;
                 }
                 if let Some([start, end]) = shadow(scene, leaf, &stretch, toward) {
+                    // Other lights along the way count for nothing, however many they are.
+                    followed += 1;
                     let weight = scene.lights.light(leaf).weight() * scene.lights.scale(LightLeaf::alone(leaf));
                     self.fill(start, end, power * weight);
                 }
