@@ -54,7 +54,8 @@ use crate::record::{InstanceId, LightId, MeshId, TextureId};
 ///
 /// - The first batch of a sampler takes about the time of a [`refit`](LightSampler::refit).
 /// - A textured mesh takes the time to build its trees, as in the builder.
-/// - Edits of [`DistantLight`](crate::DistantLight)s take a time in proportion to the number of all of these.
+/// - A batch that edits lights that are not made of triangles takes a time in proportion to the number of all
+///   [`DistantLight`](crate::DistantLight)s.
 /// - A batch that adds, replaces or removes instances that move, or adds, moves or removes meshes that do, takes a time
 ///   in proportion to the number of all that move.
 /// - A change of a mesh takes a time in proportion to the number of its triangles.

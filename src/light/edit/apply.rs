@@ -107,7 +107,8 @@ impl EditState {
         }
         // 4. One light after the other, now that motion is known.
         motion::update(edit.store.lights, &collection, (&lamps, &meshes, &instances));
-        let known = edit.store.lights.view().extras().distants();
+        // Without lamps among the changes, no distant light is among them.
+        let known = if lamps.is_empty() { &[] } else { edit.store.lights.view().extras().distants() };
         let distants = known.iter().map(|light| (light.number(), *light)).collect();
         let mut all = Application { state, tree: edit, distants, distants_change: false };
         lamps.into_iter().for_each(|(number, change)| all.change_lamp(number, change));
