@@ -13,6 +13,7 @@ use crate::common::lights::{ARITIES, build};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::random_point;
+use crate::kinds::pdf_again;
 use fanlight::{LightSample, LightSampler, ShadingPoint};
 
 /// Largest relative difference of two densities of one point.
@@ -92,7 +93,7 @@ fn examine(number: usize) -> Counts {
             let u = if i % 4 == 0 { core::array::from_fn(|_| hostile(&mut pcg)) } else { pcg.cube() };
             counts.samples += 1;
             match at.sample(u) {
-                Some(sample) => counts.check(number, &x, &sample, at.pdf(&sample.hit().expect("a triangle"))),
+                Some(sample) => counts.check(number, &x, &sample, pdf_again(&at, &sample)),
                 None => counts.none += 1,
             }
         }

@@ -1,10 +1,14 @@
 //! Light groups: what a point does not receive is never sampled and has the density zero, all else is as exact as ever,
 //! and what is left out starves nothing.
 
+use crate::common::hostile::hostile;
 use crate::common::lights::{ARITIES, aligned, sample_split};
+use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::with_lobe;
 use crate::common::statistics::{Mean, chi_square, sidak};
+use crate::common::tier::agreement;
+use crate::kinds::pdf_again;
 use fanlight::{
     Arity, DistantLight, Environment, Filter, Hit, LightId, LightSample, LightSampler, LightSamplerView, Mesh, MeshId,
     PointLight, Profile, ProfileLight, Receiver, SampledLight, ShadingPoint, SphereLight, Splitting, TriangleId,
@@ -96,6 +100,39 @@ fn again(lights: &LightSampler, x: &ShadingPoint, sample: &LightSample) -> (f32,
         SampledLight::Punctual(id) => (at.pmf_light(id), at.pmf_light(id)),
         _ => (at.pdf_environment(sample.direction), 1.0),
     }
+}
+
+/// Lights of all kinds, profiles and distant lights among them, to points of all groups: what is found later is what a
+/// sample says.
+#[test]
+fn densities_of_samples_are_found_again_for_all_groups() {
+    let (scenes, points) = (24, 40);
+    let found = parallel::map(scenes, |number| {
+        let mut pcg = Pcg32::new(number as u64, 175);
+        let (lights, groups) = scene(number, &mut pcg);
+        let mut found = [0; 3];
+        for i in 0..points {
+            let x = point(i, &mut pcg);
+            let at = lights.at(&x);
+            for _ in 0..agreement(scenes * points, 1250) {
+                let Some(sample) = at.sample(core::array::from_fn(|_| hostile(&mut pcg))) else { continue };
+                let kind = match sample.light {
+                    SampledLight::Triangle(_) => 0,
+                    SampledLight::Environment => 1,
+                    _ => 2,
+                };
+                found[kind] += 1;
+                assert!(groups.of(&sample.light) & x.groups != 0, "{x:?} {sample:?}");
+                let pdf = pdf_again(&at, &sample);
+                assert!((pdf / sample.pdf - 1.0).abs() < 1e-5, "{x:?} {sample:?} {pdf}");
+                let along = at.pdf_sample_direction(&sample);
+                assert!(along >= sample.pdf * (1.0 - 1e-5) && along.is_finite(), "{along}: {x:?} {sample:?}");
+            }
+        }
+        found
+    });
+    let found = found.iter().fold([0, 0, 0], |sum: [u64; 3], found| core::array::from_fn(|i| sum[i] + found[i]));
+    assert!(found.iter().all(|count| *count > 500), "{found:?} of triangles, the sky and lamps");
 }
 
 /// Samples are of lights that the point receives, their densities are found again, and are zero at points that do not

@@ -8,7 +8,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{LightMesh, Paint, Scene, Sky};
 use crate::common::statistics::{Mean, chi_square, sidak};
-use crate::common::tier::{some, tier};
+use crate::common::tier::{agreement, some, tier};
 use crate::instances::town::Town;
 use crate::instances::{check_agreement, pmf, point};
 use fanlight::{Arity, Hit, LightSample, LightSampler, PointSampler, RaySegment, ShadingPoint};
@@ -105,11 +105,12 @@ fn densities_agree_at_all_times() {
         let number = rounds[i];
         let (case, mut pcg) = Case::new(number, 302, number % 5, None);
         let lights = case.build();
+        let samples = agreement(10 * rounds.len(), 200);
         let mut drawn = 0;
         for kind in 0..10 {
             // Any time, and beyond the interval.
             let x = case.point(&mut pcg, kind).at_time(pcg.within(-0.2, 1.2));
-            drawn += check_agreement(&lights.as_view(), &x, &mut pcg, 8);
+            drawn += check_agreement(&lights.as_view(), &x, &mut pcg, samples);
         }
         drawn
     });
