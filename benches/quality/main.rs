@@ -47,27 +47,30 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Failure> {
-    for part in &args.parts {
-        match part {
-            Part::Table => table(args)?,
-            Part::Stratification => studies::stratification::run(args)?,
-            Part::Splitting => studies::splitting::run(args),
-            Part::Lobes => {
-                let rows = studies::lobes::run(args);
-                if let Some(path) = &args.json {
-                    std::fs::write(path, report::lobes_json(&rows))?;
-                }
-            }
-            Part::Room => studies::room::run(args)?,
-            Part::Terms => studies::terms::run(&args.effort),
-            Part::Harmonics => studies::harmonics::run(&args.effort),
-        }
+    let mut objects = vec![];
+    let outcome = args.parts.iter().try_for_each(|part| run_part(args, part, &mut objects));
+    if let (Some(path), false) = (&args.json, objects.is_empty()) {
+        std::fs::write(path, report::json(&objects))?;
+    }
+    outcome
+}
+
+/// One part, which adds its rows to those for the file.
+fn run_part(args: &Args, part: &Part, objects: &mut Vec<String>) -> Result<(), Failure> {
+    match part {
+        Part::Table => table(args, objects)?,
+        Part::Stratification => studies::stratification::run(args)?,
+        Part::Splitting => studies::splitting::run(args),
+        Part::Lobes => objects.extend(studies::lobes::run(args).iter().map(report::lobe_object)),
+        Part::Room => studies::room::run(args)?,
+        Part::Terms => studies::terms::run(&args.effort),
+        Part::Harmonics => studies::harmonics::run(&args.effort),
     }
     Ok(())
 }
 
 /// All selected workloads and methods.
-fn table(args: &Args) -> Result<(), Failure> {
+fn table(args: &Args, objects: &mut Vec<String>) -> Result<(), Failure> {
     report::print_head();
     let mut rows: Vec<Row> = scenes::NAMES.iter().flat_map(|name| comparison::run(name, args)).collect();
     rows.extend(building::NAMES.iter().flat_map(|name| building::run(name, args)));
@@ -75,9 +78,7 @@ fn table(args: &Args) -> Result<(), Failure> {
         return Err(format!("no workload and method of these names; workloads are {}", scenes::workloads()).into());
     }
     fairness::print(&rows);
-    if let Some(path) = &args.json {
-        std::fs::write(path, report::json(&rows))?;
-    }
+    objects.extend(rows.iter().map(report::object));
     if let Some(directory) = &args.plots {
         let is_drawn = |row: &&Row| !building::NAMES.contains(&row.workload.as_str());
         plot::scatter::draw(directory, &rows.iter().filter(is_drawn).cloned().collect::<Vec<_>>())?;

@@ -109,13 +109,13 @@ pub(crate) fn check_nothing_is_lost(rows: &[Row]) -> Result<(), Box<dyn core::er
     }
 }
 
-/// All rows as a list of objects.
-pub(crate) fn json(rows: &[Row]) -> String {
-    let objects: Vec<String> = rows.iter().map(object).collect();
+/// The list of these objects.
+pub(crate) fn json(objects: &[String]) -> String {
     format!("[\n{}\n]\n", objects.join(",\n"))
 }
 
-fn object(row: &Row) -> String {
+/// A row as an object.
+pub(crate) fn object(row: &Row) -> String {
     let number = |value: Option<f64>| value.filter(|v| v.is_finite()).map_or_else(|| "null".into(), |v| v.to_string());
     let mut out =
         format!("  {{\"workload\": \"{}\", \"method\": \"{}\", \"class\": \"{}\"", row.workload, row.method, row.class);
@@ -141,16 +141,12 @@ fn object(row: &Row) -> String {
     out + "}"
 }
 
-/// Rows about glossy receivers as a list of objects, with the same keys.
-pub(crate) fn lobes_json(rows: &[LobeRow]) -> String {
-    let object = |row: &LobeRow| {
-        let LobeRow { workload, method, points, relvar } = row;
-        format!(
-            "  {{\"workload\": \"{workload}\", \"method\": \"{method}\", \"class\": \"all\", \"points\": {points}, \
-             \"relvar_median\": {}, \"relvar_p90\": {}, \"relvar_ew\": {}}}",
-            relvar.median, relvar.p90, relvar.energy_weighted
-        )
-    };
-    let objects: Vec<String> = rows.iter().map(object).collect();
-    format!("[\n{}\n]\n", objects.join(",\n"))
+/// A row about glossy receivers as an object, with the same keys.
+pub(crate) fn lobe_object(row: &LobeRow) -> String {
+    let LobeRow { workload, method, points, relvar } = row;
+    format!(
+        "  {{\"workload\": \"{workload}\", \"method\": \"{method}\", \"class\": \"all\", \"points\": {points}, \
+         \"relvar_median\": {}, \"relvar_p90\": {}, \"relvar_ew\": {}}}",
+        relvar.median, relvar.p90, relvar.energy_weighted
+    )
 }
