@@ -16,6 +16,7 @@ impl Error {
     /// Whether it is no mistake but the host's own wish, given by what it passed to
     /// [`build_with`](crate::LightSamplerBuilder::build_with) or
     /// [`Environment::new_with`](crate::Environment::new_with).
+    #[must_use]
     pub fn is_cancelled(&self) -> bool {
         self.0 == ErrorKind::Cancelled
     }

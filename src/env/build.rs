@@ -159,31 +159,36 @@ impl Environment {
         Ok(())
     }
 
-    /// The borrowed form, which does all the work.
+    /// Returns the borrowed form, which does all the work.
+    #[must_use]
     #[inline]
     pub fn as_view(&self) -> EnvironmentView<'_> {
         self.view()
     }
 
-    /// [`EnvironmentView::sample`].
+    /// Draws a direction: see [`EnvironmentView::sample`].
+    #[must_use]
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
         self.as_view().sample(u)
     }
 
-    /// [`EnvironmentView::pdf`].
+    /// Returns the density of a direction: see [`EnvironmentView::pdf`].
+    #[must_use]
     #[inline]
     pub fn pdf(&self, direction: Vec3) -> f32 {
         self.as_view().pdf(direction)
     }
 
-    /// [`EnvironmentView::radiance`].
+    /// Returns the radiance along a direction: see [`EnvironmentView::radiance`].
+    #[must_use]
     #[inline]
     pub fn radiance(&self, direction: Vec3) -> f32 {
         self.as_view().radiance(direction)
     }
 
-    /// [`EnvironmentView::mean`].
+    /// Returns the mean radiance: see [`EnvironmentView::mean`].
+    #[must_use]
     pub fn mean(&self) -> f32 {
         self.header.mean
     }
@@ -193,32 +198,38 @@ impl Environment {
         self.as_view().mean_without_features()
     }
 
-    /// [`EnvironmentView::max`].
+    /// Returns the largest radiance: see [`EnvironmentView::max`].
+    #[must_use]
     pub fn max(&self) -> f32 {
         self.header.max
     }
 
-    /// [`EnvironmentView::size`].
+    /// Returns the edge of the image in texels: see [`EnvironmentView::size`].
+    #[must_use]
     pub fn size(&self) -> u32 {
         self.as_view().size()
     }
 
-    /// [`EnvironmentView::is_constant`].
+    /// Returns whether every direction has the same radiance: see [`EnvironmentView::is_constant`].
+    #[must_use]
     pub fn is_constant(&self) -> bool {
         self.as_view().is_constant()
     }
 
-    /// [`EnvironmentView::texel_solid_angle`].
+    /// Returns the solid angle of a texel: see [`EnvironmentView::texel_solid_angle`].
+    #[must_use]
     pub fn texel_solid_angle(&self) -> f32 {
         self.as_view().texel_solid_angle()
     }
 
-    /// [`EnvironmentView::clamped_texels`].
+    /// Returns how many texels were clamped: see [`EnvironmentView::clamped_texels`].
+    #[must_use]
     pub fn clamped_texels(&self) -> usize {
         self.as_view().clamped_texels()
     }
 
-    /// [`EnvironmentView::rotation`].
+    /// Returns the rotation to the world: see [`EnvironmentView::rotation`].
+    #[must_use]
     pub fn rotation(&self) -> Mat3 {
         self.as_view().rotation()
     }

@@ -34,6 +34,7 @@ impl EnvironmentView<'_> {
     /// step goes two levels down the pyramid (the first one a single level if their number is odd), where the second
     /// number chooses the row of texels and the first one the texel of the row (two-dimensional hierarchical warp,
     /// Clarberg et al. 2005, "Wavelet Importance Sampling").
+    #[must_use]
     #[inline]
     pub fn sample(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
         if self.header.mean <= 0.0 {
@@ -65,6 +66,7 @@ impl EnvironmentView<'_> {
     }
 
     /// Density, per solid angle, with which [`sample`](Self::sample) draws a unit world direction.
+    #[must_use]
     #[inline]
     pub fn pdf(&self, direction: Vec3) -> f32 {
         if self.header.mean <= 0.0 { 0.0 } else { self.pdf_of(self.radiance(direction)) }

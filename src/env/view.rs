@@ -73,48 +73,57 @@ impl EnvironmentView<'_> {
         self.filtered[0]
     }
 
-    /// Mean radiance over the sphere.
+    /// Returns the mean radiance over the sphere.
+    #[must_use]
     #[inline]
     pub fn mean(&self) -> f32 {
         self.header.mean
     }
 
-    /// Largest radiance of a texel.
+    /// Returns the largest radiance of a texel.
+    #[must_use]
     #[inline]
     pub fn max(&self) -> f32 {
         self.header.max
     }
 
-    /// Whether every direction has the same radiance.
+    /// Returns whether every direction has the same radiance.
+    #[must_use]
     #[inline]
     pub fn is_constant(&self) -> bool {
         self.header.depth == 0
     }
 
-    /// Texels a side of the equal-area image, a power of two. One if the radiance is constant.
+    /// Returns the texels a side of the equal-area image, a power of two: one if the radiance is constant.
+    #[must_use]
     #[inline]
     pub fn size(&self) -> u32 {
         1 << self.header.depth
     }
 
-    /// Solid angle of one texel: 4π over the number of texels, all of the sphere if the radiance is constant.
+    /// Returns the solid angle of one texel: 4π over the number of texels, all of the sphere if the radiance is
+    /// constant.
+    #[must_use]
     #[inline]
     pub fn texel_solid_angle(&self) -> f32 {
         SPHERE / (1_u64 << (2 * self.header.depth)) as f32
     }
 
-    /// How many texels of the input were negative and were clamped to zero.
+    /// Returns how many texels of the input were negative and were clamped to zero.
+    #[must_use]
     pub fn clamped_texels(&self) -> usize {
         self.header.clamped_texels as usize
     }
 
-    /// Rotation from the environment's frame to the world.
+    /// Returns the rotation from the environment's frame to the world.
+    #[must_use]
     #[inline]
     pub fn rotation(&self) -> Mat3 {
         Mat3::from_cols_array_2d(&self.header.rotation)
     }
 
-    /// Radiance along a unit world direction: the value of the texel that it falls into.
+    /// Returns the radiance along a unit world direction: the value of the texel that it falls into.
+    #[must_use]
     #[inline]
     pub fn radiance(&self, direction: Vec3) -> f32 {
         if self.is_constant() {

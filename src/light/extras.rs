@@ -32,6 +32,8 @@ struct ExtrasHeader {
     motion: u32,
 }
 
+const _: () = assert!(size_of::<ExtrasHeader>() == 24);
+
 /// Words of an [`ExtrasHeader`].
 const HEADER: usize = size_of::<ExtrasHeader>() / size_of::<u32>();
 /// Words of a distant light.

@@ -54,6 +54,7 @@ pub(super) const LEAST_SHARE: f64 = 2.4e-7;
 /// # Ok::<(), fanlight::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Profile<'a> {
     /// Angles from the axis in radians, at least two: from 0 to π, in ascending order. Nothing is sent before the first
     /// and beyond the last.

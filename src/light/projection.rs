@@ -54,6 +54,7 @@ const TANGENTS: [f32; 2] = [4e-4, 49.0];
 /// # Ok::<(), fanlight::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Projection<'a> {
     /// Angles of view across the image and down, in radians: the whole angles, from 1e-3 to 3.1.
     pub angles: [f32; 2],

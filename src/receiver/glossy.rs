@@ -62,6 +62,7 @@ pub(super) const LEAST_SUM2: f32 = 1e-7;
 /// assert!(x.weight(Vec3::new(-0.6, 0.0, 0.8)) > x.weight(Vec3::Z));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Glossy {
     /// Unit normal.
     normal: Vec3,
@@ -85,7 +86,6 @@ impl Glossy {
     ///
     /// If the outgoing direction is below the surface or has no direction, or the roughness is NaN, nothing is
     /// reflected: the point is guided like a diffuse one.
-    #[must_use]
     pub fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
         let (outgoing, is_valid) = (unit_or_zero(outgoing), !roughness.is_nan());
         let outgoing = if is_valid { outgoing } else { Vec3::ZERO };
@@ -98,7 +98,6 @@ impl Glossy {
     ///
     /// Only their ratio matters. What is negative or NaN counts as zero, and an infinite one as a large number. If both
     /// are zero, the point is guided like a diffuse one.
-    #[must_use]
     pub fn with_weights(self, diffuse: f32, glossy: f32) -> Self {
         let [diffuse, glossy] = [diffuse, glossy].map(|weight| f64::from(at_most(at_least(weight, 0.0), f32::MAX)));
         let share =

@@ -71,6 +71,7 @@ const ALL_SHARES: u16 = u16::MAX;
 /// assert!(x.weight(Vec3::new(-0.4, 0.0, -0.91652)) > x.weight(mirror));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Microfacet {
     /// Unit normal.
     normal: Vec3,
@@ -95,7 +96,6 @@ impl Microfacet {
     /// All parameters are those of [`Glossy::new`]. The outgoing direction must be on the side of the normal. If it is
     /// not, has no direction, or a roughness is NaN, the point is guided like a diffuse one, and with a transmission
     /// like a transmissive one.
-    #[must_use]
     pub fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
         let (normal, outgoing) = (unit(normal), unit_or_zero(outgoing));
         let surface = Self { normal, outgoing, angle: 0.0, roughness: [1.0; 2], ior: 1.0, shares: [ALL_SHARES, 0] };
@@ -110,7 +110,6 @@ impl Microfacet {
     ///
     /// If the tangent has no direction across the normal, the surface is as rough in all directions, by the geometric
     /// mean.
-    #[must_use]
     pub fn anisotropic(self, tangent: Vec3, roughness: [f32; 2]) -> Self {
         let surface = self.with_roughness(roughness);
         let (along, axes) = (unit_or_zero(tangent).as_dvec3(), axes_across(self.normal));
@@ -136,7 +135,6 @@ impl Microfacet {
     /// Only their ratios matter. What is negative or NaN counts as zero, and an infinite one as a large number. If the
     /// last two are zero, the point is guided like a diffuse one. The factor η² by which a refraction changes radiance
     /// may be in the weight of the transmission.
-    #[must_use]
     pub fn with_weights(self, diffuse: f32, reflected: f32, transmitted: f32) -> Self {
         let weights =
             [diffuse, reflected, transmitted].map(|weight| f64::from(at_most(at_least(weight, 0.0), f32::MAX)));
@@ -166,7 +164,6 @@ impl Microfacet {
     /// Within 0.01 of 1, as without this call, light passes straight on, and what is transmitted is spread as the
     /// reflection is: a thin wall, such as a pane with air on both sides. NaN counts as 1, and what is below 0.1 or
     /// above 10 as these.
-    #[must_use]
     pub fn with_ior(self, ior: f32) -> Self {
         // NaN fails.
         let refracts = (ior - 1.0).abs() > THIN;
@@ -311,7 +308,6 @@ impl From<Glossy> for Microfacet {
 
 impl Glossy {
     /// Returns the same surface with a roughness along a tangent and one across; see [`Microfacet::anisotropic`].
-    #[must_use]
     pub fn anisotropic(self, tangent: Vec3, roughness: [f32; 2]) -> Microfacet {
         Microfacet::from(self).anisotropic(tangent, roughness)
     }

@@ -37,6 +37,7 @@ const LARGEST_ASYMMETRY: f32 = 0.99;
 /// assert!(x.weight(-Vec3::X) > x.weight(Vec3::X));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Scattering {
     /// Unit vector; zero if there is none.
     outgoing: Vec3,
@@ -52,7 +53,6 @@ impl Scattering {
     ///   forward. Absolute values above 0.99 count as 0.99.
     ///
     /// If the outgoing direction has no direction, or the asymmetry is NaN, the point is guided like an isotropic one.
-    #[must_use]
     pub fn new(outgoing: Vec3, asymmetry: f32) -> Self {
         let outgoing = unit_or_zero(outgoing);
         let is_valid = !asymmetry.is_nan() && outgoing != Vec3::ZERO;

@@ -74,6 +74,7 @@ impl EmissionSample {
 /// Made by [`LightSampler::emission`](crate::LightSampler::emission) in some microseconds; holds about 1.5 KB. Make it
 /// again after the environment has been rotated.
 #[derive(Clone, Debug)]
+#[must_use]
 pub struct Emission<'a> {
     scene: LightScene<'a>,
     directions: DirectionDistribution,
@@ -86,7 +87,6 @@ pub struct Emission<'a> {
 
 impl<'a> LightSamplerView<'a> {
     /// Prepares to draw rays of light.
-    #[must_use]
     pub fn emission(&self) -> Emission<'a> {
         Emission::new(self.scene)
     }
@@ -110,7 +110,6 @@ impl<'a> Emission<'a> {
     /// Sets the time at which light leaves, in the shutter interval from 0 to 1; 0 until this sets it, and for NaN. A
     /// time outside of the interval counts as its nearer end. It matters only where lights move, and costs nothing: an
     /// [`Emission`] can be copied for each photon's time.
-    #[must_use]
     pub fn at_time(mut self, time: f32) -> Self {
         self.scene.lights.time = shutter_time(time);
         self
@@ -123,7 +122,6 @@ impl<'a> Emission<'a> {
     /// power of a ray is radiance over density, or irradiance over density for a light without an extent. Without
     /// distant lights, or with a radius that is not positive, nothing changes; another ball takes the place of the one
     /// before.
-    #[must_use]
     pub fn within(mut self, center: Vec3, radius: f32) -> Self {
         let Some(rays) = DistantRays::new(&self.scene.lights, center, radius) else { return self };
         let share = rays.power() / (rays.power() + self.power());

@@ -24,6 +24,7 @@ pub(super) const MAX_LANES: usize = 16;
 
 impl Arity {
     /// Returns the number of children that a node has room for.
+    #[must_use]
     pub const fn lanes(self) -> usize {
         self as usize
     }

@@ -201,6 +201,8 @@ pub(crate) struct Spread {
     pub(super) variance: f32,
 }
 
+const _: () = assert!(size_of::<Spread>() == 12);
+
 impl Spread {
     /// Multiplies all energies.
     pub(super) fn scale(&mut self, factor: f64) {
@@ -213,6 +215,8 @@ impl Spread {
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(crate) struct Slot(u32);
+
+const _: () = assert!(size_of::<Slot>() == 4);
 
 impl Slot {
     /// Slot of the root, which no lane refers to.

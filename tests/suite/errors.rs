@@ -36,7 +36,7 @@ fn textures() {
     for (bad, value) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf"), (f32::NEG_INFINITY, "-inf"), (-0.5, "-0.5")] {
         assert_error(value, Texture::new(2, 3, &with(bad)), &["texture", "(1, 1)", value, "finite and not negative"]);
     }
-    Texture::new(2, 3, &with(3.0)).expect("these texels are valid");
+    let _ = Texture::new(2, 3, &with(3.0)).expect("these texels are valid");
 }
 
 #[test]

@@ -18,6 +18,7 @@ pub(crate) const MAX_TEXTURE_SIDE: usize = 1 << 15;
 /// number of copies: a triangle takes no more than 64 kB, or half a byte a texel if that is more, besides the 256 kB
 /// that all triangles of a small image share. For a weight without an image see [`Procedural`](crate::Procedural).
 #[derive(Clone, Copy, Debug)]
+#[must_use]
 pub struct Texture<'a> {
     width: u32,
     height: u32,
@@ -49,13 +50,11 @@ impl<'a> Texture<'a> {
     }
 
     /// How the host reads between texel centers.
-    #[must_use]
     pub fn filter(self, filter: Filter) -> Self {
         Self { filter, ..self }
     }
 
     /// How the host reads outside of `[0, 1]`, along `u` and along `v`.
-    #[must_use]
     pub fn wrap(self, u: Wrap, v: Wrap) -> Self {
         Self { wrap: [u, v], ..self }
     }
@@ -96,6 +95,7 @@ impl<'a> Texture<'a> {
     }
 
     /// The weight at texture coordinates, as the host sees it. Coordinates that are not finite are an arbitrary place.
+    #[must_use]
     pub fn value(&self, u: f32, v: f32) -> f32 {
         let x = f64::from(u) * f64::from(self.width);
         let y = f64::from(v) * f64::from(self.height);

@@ -55,6 +55,8 @@ pub(crate) struct ObjectHeader {
     pub(super) normals: [f32; 6],
 }
 
+const _: () = assert!(size_of::<ObjectHeader>() == 148);
+
 /// Words of the header. *Format.*
 const HEADER_WORDS: usize = size_of::<ObjectHeader>() / size_of::<u32>();
 /// Words of a triangle. *Format.*

@@ -40,6 +40,8 @@ struct MotionHeader {
     instances: u32,
 }
 
+const _: () = assert!(size_of::<MotionHeader>() == 12);
+
 /// Words of a [`MotionHeader`]. *Format.*
 const HEADER: usize = size_of::<MotionHeader>() / size_of::<u32>();
 /// Words of a [`MovingMesh`]. *Format.*
@@ -58,6 +60,8 @@ pub(super) struct MovingMesh {
     /// Place of its vertices among those of all triangles that move.
     start: u32,
 }
+
+const _: () = assert!(size_of::<MovingMesh>() == 8);
 
 /// The ends of all that moves, in borrowed memory: a [`MotionHeader`], and the arrays that it counts. Empty if nothing
 /// moves.

@@ -70,7 +70,7 @@ impl<'a> ChildPowers<'a> {
             return;
         }
         let inverse = along.recip();
-        let mut block = Block { places: [0.0; 3], sides: [[0.0; 2]; 3], power };
+        let mut block = PowerBlock { places: [0.0; 3], sides: [[0.0; 2]; 3], power };
         for k in 0..3 {
             block.places[k] = self.axes[k].dot(center) * inverse;
             for (step, side) in block.sides[k].iter_mut().zip(sides) {
@@ -126,7 +126,7 @@ impl Kernel for ChildPowers<'_> {
 const CHILD_AREA: f32 = 0.5;
 
 /// A parallelogram of even brightness, by coordinates that count children along an edge.
-struct Block {
+struct PowerBlock {
     /// Center, along each axis.
     places: [f32; 3],
     /// Both sides, along each axis.
@@ -134,7 +134,7 @@ struct Block {
     power: f32,
 }
 
-impl Block {
+impl PowerBlock {
     /// Adds what each child shows.
     #[inline(always)]
     fn add(&self, powers: &mut [f32; ARITY]) {
@@ -201,7 +201,7 @@ mod tests {
     use alloc::vec::Vec;
 
     /// What the children show of a parallelogram, by many points of it.
-    fn by_points(block: &Block) -> Vec<f32> {
+    fn by_points(block: &PowerBlock) -> Vec<f32> {
         const POINTS: usize = 400;
         let mut powers = alloc::vec![0.0; ARITY];
         for i in 0..POINTS * POINTS {
@@ -216,9 +216,9 @@ mod tests {
         powers
     }
 
-    fn block([place1, place2]: [f32; 2], [s1, s2]: [f32; 2], [t1, t2]: [f32; 2]) -> Block {
+    fn block([place1, place2]: [f32; 2], [s1, s2]: [f32; 2], [t1, t2]: [f32; 2]) -> PowerBlock {
         let places = [EDGE as f32 - place1 - place2, place1, place2];
-        Block { places, sides: [[-s1 - s2, -t1 - t2], [s1, t1], [s2, t2]], power: 3.0 }
+        PowerBlock { places, sides: [[-s1 - s2, -t1 - t2], [s1, t1], [s2, t2]], power: 3.0 }
     }
 
     /// The variance that choosing children by the estimate adds, relative to the squared mean, stays low for blocks of

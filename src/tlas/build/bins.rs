@@ -94,14 +94,14 @@ impl Extent {
 /// Memory for one split at a time: to clear what a split needs of it is faster than to make all of it each time.
 pub(super) struct Scratch {
     bins: Bins,
-    sides: Sides,
+    sides: SplitSides,
 }
 
 impl Scratch {
     pub(super) fn new() -> Self {
         Self {
             bins: [[Cluster::EMPTY; BINS]; 3],
-            sides: Sides { clusters: [[Cluster::EMPTY; LANES]; FOURS], count: 0 },
+            sides: SplitSides { clusters: [[Cluster::EMPTY; LANES]; FOURS], count: 0 },
         }
     }
 }
@@ -200,12 +200,12 @@ const LANES: usize = 4;
 const FOURS: usize = (3 * 2 * (BINS - 1)).div_ceil(LANES);
 
 /// What is on the left and on the right of each boundary that is compared.
-struct Sides {
+struct SplitSides {
     clusters: [[Cluster; LANES]; FOURS],
     count: usize,
 }
 
-impl Sides {
+impl SplitSides {
     /// Adds both sides of each boundary between the bins of an axis.
     fn push(&mut self, bins: &[Cluster]) {
         let boundaries = bins.len() - 1;
