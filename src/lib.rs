@@ -55,7 +55,8 @@
 //! portal does not end a ray: where a second portal may lie on the way, use the first and the third.
 //!
 //! Lights that are not made of triangles are in the same tree: [`SphereLight`], [`DiskLight`], [`TubeLight`], and
-//! without an extent [`PointLight`] and [`SpotLight`]. [`DistantLight`]s are in no tree and compete with it.
+//! without an extent [`PointLight`], [`SpotLight`] and [`ProfileLight`]. [`DistantLight`]s are in no tree and compete
+//! with it.
 //! [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a [`LightId`].
 //!
 //! What stands in a scene many times is built once: [`add_object`](LightSamplerBuilder::add_object) takes the meshes,
@@ -92,7 +93,8 @@
 //! - intersecting the host's scene, and visibility. (Rays are intersected with lights only, for the density of a
 //!   direction. What a host finds out about visibility can be learned: [`Visibility`].)
 //! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
-//! - products with a BSDF or a phase function, beyond the cosine.
+//! - evaluating a BSDF or a phase function. Samples follow the lobe that the host describes; the host's own function
+//!   stays the host's.
 //! - reading image or scene files.
 //! - another environment, other objects and other profiles in a built sampler. The environment can be rotated; lights,
 //!   meshes and instances can be added, removed and changed ([`edit`](LightSampler::edit),
@@ -104,7 +106,8 @@
 //! Lengths are in any unit, as long as it is the same everywhere; coordinates go up to 1e9. The weight of an emitter is
 //! its radiance, the weight of a portal its transmittance, and the environment holds radiance. Radiance is in any unit
 //! too, but in the same unit for emitters and environment, because they compete for samples. The weight of a light
-//! without an extent is its radiant intensity: radiance times the square of the unit of length.
+//! without an extent is its radiant intensity: radiance times the square of the unit of length. The weight of a
+//! [`DistantLight`] is its irradiance on a surface that faces it.
 //!
 //! Densities are per solid angle at the shading point (1/sr) unless their name or their documentation says per area of
 //! the light. `pmf` is a probability, without a unit.

@@ -56,7 +56,7 @@ impl<'a> Progress<'a> {
 /// the end to a host that rounds.
 const LARGEST_SHARE: f64 = 0.99;
 
-/// Count from which on the host has cancelled. *Format*: the highest bit, which no number of units reaches.
+/// Count from which on the host has canceled. *Format*: the highest bit, which no number of units reaches.
 const CANCELLED: usize = 1 << (usize::BITS - 1);
 
 /// A number that all threads add to; without threads a plain one, which every target has.

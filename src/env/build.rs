@@ -57,7 +57,7 @@ impl Environment {
     ///
     /// # Errors
     ///
-    /// Those of [`new`](Self::new), and one of which [`Error::is_cancelled`] is true if `report` has cancelled the
+    /// Those of [`new`](Self::new), and one of which [`Error::is_cancelled`] is true if `report` has canceled the
     /// build.
     pub fn new_with(
         image: &EnvironmentImage<'_>,

@@ -213,7 +213,7 @@ fn center(depth: u32, [x, y]: [u32; 2]) -> Vec3 {
 #[derive(Debug)]
 pub(crate) struct RegionSums {
     weights: [f32; REGIONS],
-    /// Of columns rather than rows: a sum of rows is a sum of vectors.
+    /// Sums of columns rather than rows: a sum of rows is a sum of vectors.
     columns: [f32; REGIONS_A_SIDE],
     total: f32,
 }

@@ -188,7 +188,7 @@ impl<'a> LightCollection<'a> {
     ///
     /// # Errors
     ///
-    /// If there are too many nodes, or if the host has cancelled the build.
+    /// If there are too many nodes, or if the host has canceled the build.
     pub(crate) fn build_images(&mut self, progress: &Progress<'_>) -> Result<(), Error> {
         self.packed = extras::pack(&[], &[], &[], self.profiles.arrays(), &self.motion.pack());
         let trees = core::mem::take(&mut self.images);

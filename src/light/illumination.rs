@@ -31,7 +31,8 @@ pub enum Illumination {
 
 /// Least cosine of the point-to-point term in a cell that is not below the horizon as a whole.
 ///
-/// From the talk's own comparison, which this term is kept for. Zero loses light at the horizon.
+/// *Chosen*: from the talk's own comparison, which this term is kept for. Larger values send samples to the horizon.
+/// Zero loses light there.
 const LEAST_CELL_COSINE: f32 = 0.01;
 
 /// Share of the conservative term that the boundary integral keeps where rounding makes it vanish.

@@ -22,7 +22,7 @@ pub enum Sides {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Weight {
-    /// The same everywhere; finite, not negative.
+    /// A weight that is the same everywhere; finite, not negative.
     Constant(f32),
     /// A texture or a [`Procedural`](crate::Procedural), seen through the mesh's texture coordinates.
     Texture(TextureId),

@@ -80,8 +80,8 @@ impl Glossy {
     ///   [`ShadingPoint::new`](crate::ShadingPoint::new).
     /// - `outgoing` points away from the surface, to where the light is scattered: to the viewer, back along a path.
     ///   Its length does not matter.
-    /// - `roughness` is the α of the GGX distribution, in `[0, 1]`: the root mean square slope over √2, and *not* its
-    ///   square root, which artists are often given. Below 1e-3 it counts as 1e-3, and above 1 as 1. There, light that
+    /// - `roughness` is the α of the GGX distribution, in `[0, 1]` (Walter et al. 2007), and *not* its square root,
+    ///   which artists are often given. Below 1e-3 it counts as 1e-3, and above 1 as 1. There, light that
     ///   is not found by sampling the BSDF is hardly found by sampling lights.
     ///
     /// If the outgoing direction is below the surface or has no direction, or the roughness is NaN, nothing is

@@ -105,8 +105,8 @@ impl Microfacet {
     /// Returns the same surface with a roughness along a tangent and one across.
     ///
     /// - `tangent` is any vector; what it has along the normal does not count, and its length does not matter.
-    /// - `roughness` are the αx and αy of the GGX distribution, each as in [`Glossy::new`]: the root mean square slopes
-    ///   along the tangent and across it, over √2.
+    /// - `roughness` are the αx and αy of the GGX distribution, each as in [`Glossy::new`]: along the tangent and
+    ///   across it.
     ///
     /// If the tangent has no direction across the normal, the surface is as rough in all directions, by the geometric
     /// mean.

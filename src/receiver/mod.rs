@@ -71,9 +71,9 @@ pub(crate) const ALL_GROUPS: u32 = u32::MAX;
 
 /// Largest difference of a squared length from 1 up to which a normal counts as a unit vector.
 ///
-/// Twice 1e-3 to first order, which is what a normal interpolated in half precision is off. A larger value accepts
-/// normals that bias nothing but guide worse; a smaller one spends time on normals that are good enough. Documented at
-/// [`ShadingPoint::new`].
+/// *Chosen*: twice 1e-3 to first order, which is what a normal interpolated in half precision is off. A larger value
+/// accepts normals that bias nothing but guide worse; a smaller one spends time on normals that are good enough.
+/// Documented at [`ShadingPoint::new`].
 const UNIT_TOLERANCE: f32 = 2e-3;
 
 impl Receiver {

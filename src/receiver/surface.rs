@@ -9,8 +9,8 @@ use crate::geometry::is_below;
 
 /// Least cosine that a cell of directions above the horizon is weighed by.
 ///
-/// A guard against rounding: cells at the horizon have centers of about 1e-2. Larger values send samples to the
-/// horizon; smaller ones leave a cell too few where rounding has taken its center below.
+/// *Chosen*, as a guard against rounding: cells at the horizon have centers of about 1e-2. Larger values send samples
+/// to the horizon; smaller ones leave a cell too few where rounding has taken its center below.
 const LEAST_CELL_COSINE: f32 = 1e-4;
 
 #[derive(Clone, Copy)]

@@ -92,7 +92,7 @@ impl<'a> LightSamplerBuilder<'a> {
         self
     }
 
-    /// Makes the environment one more light, next to the triangles: for scenes under the open sky, or with openings
+    /// Makes the environment one more light, next to all others: for scenes under the open sky, or with openings
     /// that nobody has marked as portals. Off by default.
     ///
     /// A sample then is a point of a triangle or a direction of the environment
@@ -102,7 +102,7 @@ impl<'a> LightSamplerBuilder<'a> {
     /// is seen through portals, leave this off. Where lamps are often hidden,
     /// [`sample_split`](crate::PointSampler::sample_split) without any splitting draws one of each, for a ray more.
     ///
-    /// Without any triangle, the environment is the only light. A black environment is none.
+    /// Without any other light, the environment is the only one. A black environment is none.
     pub fn environment_as_light(mut self) -> Self {
         self.environment_as_light = true;
         self
@@ -310,7 +310,7 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Self::build`], and one of which [`Error::is_cancelled`] is true if `report` has cancelled the build.
+    /// As [`Self::build`], and one of which [`Error::is_cancelled`] is true if `report` has canceled the build.
     pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler, Error> {
         self.build_reporting(Some(&report))
     }

@@ -140,7 +140,7 @@ impl Mixture {
     /// Balances all that lights send with what the environment sends as a light.
     #[inline(never)]
     fn add_sky(&mut self, at: &Viewpoint<'_>, regions: &RegionMoments) {
-        // In place: it is too large to be copied for nothing.
+        // In place: it is too large to be copied without need.
         let sky = self.sky.insert(Sky::unweighed(at));
         sky.weigh(at, regions);
         let irradiance = f64::from(sky.irradiance());

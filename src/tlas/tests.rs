@@ -76,7 +76,7 @@ pub(super) fn open(x: &ShadingPoint) -> Before<'_> {
     Before { x, odd_alone: false }
 }
 
-/// Of the leaves in doubt only those with odd numbers are visible.
+/// Hides leaves: of those in doubt, only those with odd numbers are visible.
 fn odd(x: &ShadingPoint) -> Before<'_> {
     Before { x, odd_alone: true }
 }

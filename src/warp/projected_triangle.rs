@@ -66,7 +66,7 @@ struct Wedge {
 struct Arc {
     /// What its normal has along both azimuths of the frame, and along the normal of the plane, which is not negative.
     side: [f64; 3],
-    /// The same of the direction in it that is a quarter turn on from the corner.
+    /// Projection of the direction in it that is a quarter turn on from the corner.
     turned: [f64; 3],
 }
 

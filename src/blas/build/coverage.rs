@@ -19,7 +19,7 @@ const IMAGE_FLOOR: f64 = 1e-6;
 /// Footprints of up to about this many texels are integrated exactly. Leaves are far smaller, unless a triangle ran
 /// out of its budget.
 ///
-/// *Measured* (ACCURACY.md, "Constants of the trees over textures"): half or twice the value changes the variance by
+/// *Measured* (CONSTANTS.md, "Constants of the trees over textures"): half or twice the value changes the variance by
 /// less than 1 %. Larger takes longer to build.
 const EXACT_TEXELS: f64 = 48.0;
 

@@ -21,7 +21,7 @@ use crate::record::{Filter, Wrap};
 
 /// A cell with no more area than this, in texels, is fine if it is short, too.
 ///
-/// *Measured* (ACCURACY.md, "Constants of the trees over textures"). Larger changes nothing as long as the length
+/// *Measured* (CONSTANTS.md, "Constants of the trees over textures"). Larger changes nothing as long as the length
 /// limits; smaller divides blurred cells of one texel.
 const FINE_AREA: f64 = 1.0;
 
@@ -49,7 +49,7 @@ const IMAGE_VARIANCE: f64 = 0.003;
 const RAMP: f64 = 1.0 / 3.0;
 
 /// Bytes for each texel that a triangle covers. A budget: with half of it noise has 1.25 times the variance, with twice
-/// 0.8 times (ACCURACY.md, "Constants of the trees over textures"). Where it covers copies of them, each texel counts
+/// 0.8 times (CONSTANTS.md, "Constants of the trees over textures"). Where it covers copies of them, each texel counts
 /// for a quarter.
 const BYTES_PER_TEXEL: f64 = 2.0;
 
@@ -71,7 +71,7 @@ const MOST_SHARES: f64 = 4.0;
 
 /// A triangle that covers fewer texels has no tree. One that covers as many may have a node, whatever it takes.
 ///
-/// *Measured* (ACCURACY.md, "Constants of the trees over textures"): with twice the value a triangle over five texels
+/// *Measured* (CONSTANTS.md, "Constants of the trees over textures"): with twice the value a triangle over five texels
 /// of noise has nine times the variance; with less, fine meshes take a node of 76 bytes for every triangle.
 const LEAST_TEXELS: f64 = 4.0;
 
@@ -140,7 +140,7 @@ fn units(texture: &Texture<'_>, uv: [Vec2; 3]) -> usize {
 ///
 /// # Errors
 ///
-/// If the pool has no more indices, or if the host has cancelled the build.
+/// If the pool has no more indices, or if the host has canceled the build.
 pub(crate) fn build_images(
     trees: &[ImageTree<'_>],
     pool: &mut Vec<CellNode>,

@@ -16,7 +16,7 @@ use crate::geometry::subdivision_centers;
 const BYTES_PER_FUNCTION: f64 = (1 << 20) as f64;
 
 /// Bytes for one triangle, at most. A budget: discs have a relative variance of 0.033 with half of it, 0.027 with all,
-/// and 0.027 with twice as much (ACCURACY.md, "Constants of the trees over textures").
+/// and 0.027 with twice as much (CONSTANTS.md, "Constants of the trees over textures").
 const FUNCTION_TREE_BYTES: f64 = (1 << 18) as f64;
 
 /// Bytes that every triangle may have, whatever others take. A budget.

@@ -34,7 +34,7 @@ fn support(filter: Filter) -> f64 {
 
 /// Blocks along a large footprint; they are not looked into.
 ///
-/// *Measured* (ACCURACY.md, "Constants of the trees over textures"): half or twice the value changes the variance by
+/// *Measured* (CONSTANTS.md, "Constants of the trees over textures"): half or twice the value changes the variance by
 /// less than 3 %, and only where leaves hold copies of the image. More takes longer to build.
 const FOOTPRINT_BLOCKS: u32 = 8;
 

@@ -125,7 +125,7 @@ impl<'a> LightCollection<'a> {
     ///
     /// # Errors
     ///
-    /// If the words of objects are more than can be numbered, or if the host has cancelled the build.
+    /// If the words of objects are more than can be numbered, or if the host has canceled the build.
     pub(crate) fn build_objects(
         &mut self,
         arity: Arity,

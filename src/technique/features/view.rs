@@ -15,14 +15,14 @@ use crate::warp::Variate;
 /// Ratio of a cell's to a feature's angular radius up to which the cell counts as one part, however its texture
 /// varies.
 ///
-/// Chosen, not swept. A step makes cells an eighth as wide, so that the parts of a textured triangle are from half as
-/// wide as the feature to four times as wide. A part is weighed by the mean of those of its children, again an eighth
-/// as wide, that the feature may be visible through. Larger: fewer parts, so that a shading point costs less, but
-/// children as wide as the feature, whose mean says less of what it shines through. Smaller: up to 64 times as many
-/// parts, of which the list holds [`MAX_VISIBLE`](super::list::MAX_VISIBLE).
+/// *Measured* (docs/CONSTANTS.md). A step makes cells an eighth as wide, so that the parts of a textured triangle are
+/// from half as wide as the feature to four times as wide. A part is weighed by the mean of those of its children,
+/// again an eighth as wide, that the feature may be visible through. Larger: fewer parts, so that a shading point costs
+/// less, but children as wide as the feature, whose mean says less of what it shines through. Smaller: up to 64 times
+/// as many parts, of which the list holds [`MAX_VISIBLE`](super::list::MAX_VISIBLE).
 const SMALL_CELL: f32 = 4.0;
 
-/// The same with the least effort. *Measured* (docs/CONSTANTS.md).
+/// Value of [`SMALL_CELL`] with the least effort. *Measured* (docs/CONSTANTS.md).
 ///
 /// Larger: a shading point costs less, and the means say less of what the feature shines through. Smaller: the other way
 /// round.

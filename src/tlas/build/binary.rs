@@ -169,7 +169,7 @@ mod tests {
     use super::*;
     use crate::bounds::LightBounds;
 
-    /// The same with a branch for each item.
+    /// Partitions the items with a branch for each item.
     fn partition_one_by_one(items: &mut [Item], is_left: impl Fn(&Item) -> bool) -> usize {
         let (mut from, mut to) = (0, items.len());
         loop {

@@ -11,11 +11,11 @@ use crate::parallel::{CHUNK, reduce};
 const BINS: usize = 10;
 /// Smallest number of bins per axis, for sets of fewer lights than that. More bins than lights stay empty, fewer leave
 /// no choice.
-/// *Measured*: docs/ACCURACY.md, "Constants of the build"; not sensitive.
+/// *Measured*: docs/CONSTANTS.md, "Constants of the build"; not sensitive.
 const FEWEST_BINS: usize = 4;
 /// Padding of flat boxes, relative to the longest edge of the box that is split. Without any, all splits of a flat set
 /// cost nothing; much more would hide thin shapes.
-/// *Measured*: docs/ACCURACY.md, "Constants of the build"; not sensitive.
+/// *Measured*: docs/CONSTANTS.md, "Constants of the build"; not sensitive.
 const PAD: f32 = 1e-3;
 
 /// A set of lights that is to be split.

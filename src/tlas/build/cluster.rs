@@ -10,7 +10,7 @@ use crate::bounds::{LightBounds, orientation_measures};
 
 /// Least squared length of the middle of a box of unit normals. Below it, the normals count as pointing everywhere: the
 /// middle is no direction any more, and dividing by its length would only enlarge rounding. Affects costs alone.
-/// *Measured*: docs/ACCURACY.md, "Constants of the build"; not sensitive.
+/// *Measured*: docs/CONSTANTS.md, "Constants of the build"; not sensitive.
 const LEAST_MIDDLE2: f32 = 1e-4;
 
 /// A light on its way into the tree. Fourth components hold what has no vector of its own: a build reads and moves all

@@ -28,7 +28,7 @@ use crate::progress::{Cancelled, Progress};
 use crate::tlas::arity::Arity;
 use crate::tlas::tree::Tlas;
 
-/// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds
+/// Arranges `count` lights, whose bounds `light` returns, in a tree of this arity, or of a lower one that holds
 /// them all in one node. Returns it with the lights in the order of its leaves; its nodes know no bounds until
 /// [`Tlas::fit`]. Every light that has found its place is a unit of progress.
 #[cfg(test)]
@@ -41,7 +41,7 @@ pub(crate) fn build(
     build_in_groups(arity, count, light, &[], progress)
 }
 
-/// Arranges `count` lights, of which `light` tells the bounds, in a tree of this arity, or of a lower one that holds
+/// Arranges `count` lights, whose bounds `light` returns, in a tree of this arity, or of a lower one that holds
 /// them all in one node. `groups` are the light groups of each, or nothing. Returns the tree with the lights in the
 /// order of its leaves; its nodes know no bounds until [`Tlas::fit`]. Every light that has found its place is a unit of
 /// progress.

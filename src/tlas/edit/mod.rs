@@ -125,7 +125,7 @@ pub(crate) struct TreeEdit<'t, S> {
     pub(crate) store: &'t mut S,
 }
 
-/// The same in its own arity.
+/// Edit of a tree in its own arity.
 struct WideEdit<'t, const N: usize, S> {
     tlas: &'t mut Tlas,
     state: &'t mut TreeState,

@@ -112,7 +112,8 @@ const LEAST_NEAR_SHARE: f32 = 1e-3;
 /// Least squared distance. *Proved*: its inverse is finite. A larger one would show in tiny scenes.
 const LEAST_DISTANCE2: f32 = 1e-30;
 
-// How much of each variance counts. Measured: docs/ACCURACY.md, "Moments".
+// How much of each variance counts. Measured: docs/ACCURACY.md, "Moments", and, for the receiver, "Samples that
+// choose nothing".
 
 /// Share of the normals' variance, along the line of sight.
 pub(super) const NORMAL_VARIANCE_SHARE: f32 = 0.4;
