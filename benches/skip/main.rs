@@ -1,7 +1,7 @@
 //! What is saved where a scene does not need something: pairs of scenes, one with and one without it.
 //!
-//! `cargo bench -p fanlight-benches --bench skip` prints a table. Times are medians of runs that take turns, so that
-//! both see the same machine; bytes are those that the samplers report.
+//! `cargo bench -p fanlight-benches --bench skip` prints a table. Times are medians of runs that are interleaved, so
+//! that both see the same machine; bytes are those that the samplers report.
 
 #[path = "../instruction_set.rs"]
 mod instruction_set;
@@ -57,7 +57,7 @@ fn main() {
     let mut pcg = Pcg32::new(3, 3);
     let numbers: Vec<[f32; 3]> = (0..samples).map(|_| pcg.uniform3()).collect();
     println!("times with the instructions {}\n", instruction_set::name());
-    println!("| what the scene does not need | ns a sample with | without | KB with | without |");
+    println!("| what the scene does not have | ns a sample with | without | KB with | without |");
     println!("| --- | ---: | ---: | ---: | ---: |");
     for Saving { name, with, without } in savings() {
         let mut times = [vec![], vec![]];
@@ -101,7 +101,7 @@ fn savings() -> Vec<Saving> {
             without: side(quad(true, white(), None, 1, 0.0), room_points()),
         },
         Saving {
-            name: "contrast in the part of the environment that is seen",
+            name: "contrast in the visible part of the environment",
             with: side(quad(true, half(&noise), None, 1, 0.0), room_points()),
             without: side(quad(true, half(&vec![0.5; noise.len()]), None, 1, 0.0), room_points()),
         },

@@ -62,7 +62,7 @@ pub(crate) trait Method: Sync {
     /// Memory that sampling needs.
     fn bytes(&self) -> usize;
 
-    /// Whether it keeps an environment of its own, whose radiance it hands over with each direction.
+    /// Whether it keeps an environment of its own, whose radiance it returns with each direction.
     fn has_own_environment(&self) -> bool {
         false
     }

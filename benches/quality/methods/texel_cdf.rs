@@ -60,7 +60,7 @@ fn cross(a: DVec2, b: DVec2) -> f64 {
     a.x * b.y - a.y * b.x
 }
 
-/// Cuts a light along texels; hands over barycentrics and the mean of the texel.
+/// Cuts a light along texels; passes on barycentrics and the mean of the texel.
 fn for_each_part(scene: &Scene, light: &Light, mut each: impl FnMut([DVec2; 3], f64)) {
     let image = match (&scene.image, light.weight) {
         (Some(image), Weight::Image) => image,

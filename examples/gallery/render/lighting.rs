@@ -65,7 +65,7 @@ pub(crate) struct Lights {
 }
 
 impl Lights {
-    /// Hands over all that emits light or lets it in.
+    /// Passes in all that emits light or lets it in.
     pub(crate) fn new(model: &Model, illumination: Illumination) -> Result<Self, Error> {
         Self::build(model, illumination, false)
     }

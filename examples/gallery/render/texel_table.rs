@@ -127,7 +127,7 @@ impl TexelTable {
     }
 }
 
-/// Cuts a triangle along the texels of an image that it has once on it; hands over barycentrics and the texel.
+/// Cuts a triangle along the texels of an image that it has once on it; passes on barycentrics and the texel.
 fn for_each_part(uvs: [Vec2; 3], [width, height]: [usize; 2], mut each: impl FnMut([Vec2; 3], usize)) {
     let corners = [Vec2::ZERO, Vec2::X, Vec2::Y];
     if width * height == 1 {

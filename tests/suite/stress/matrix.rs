@@ -159,7 +159,7 @@ fn print(title: &str, table: &[(&'static str, Vec<Cell>)], entry: impl Fn(&Cell)
 
 fn print_all(table: &[(&'static str, Vec<Cell>)]) {
     let is_dark = |cell: &Cell| cell.found.iter().all(|found| found.dark);
-    print("Normalisation", table, |cell| {
+    print("Normalization", table, |cell| {
         if is_dark(cell) {
             return "dark".into();
         }
