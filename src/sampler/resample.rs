@@ -50,8 +50,8 @@ impl PointSampler<'_> {
     /// The estimate is `f(sample) * weight`, with `f` as it would be divided by the density of a single sample. It is
     /// unbiased for any number of candidates and any target. A sample on an emitter stands for its point alone. A
     /// sample on a portal, or on the environment as a light, stands for all of the environment that arrives along its
-    /// direction, and for no emitter on the way: those have samples of their own. The pair of sample and weight is the initial candidate of
-    /// reservoir methods (Bitterli et al. 2020).
+    /// direction, and for no emitter on the way: those have samples of their own. The pair of sample and weight is the
+    /// initial candidate of reservoir methods (Bitterli et al. 2020).
     ///
     /// For multiple importance sampling there is no density of the result, and one over the weight must not stand in
     /// for it: it is random. But the weights of the techniques may be any functions of the direction that add up to 1.
