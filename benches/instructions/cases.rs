@@ -9,11 +9,12 @@ use fanlight::{
 use glam::{Affine3A, Quat, Vec3};
 use smallvec::SmallVec;
 
+use super::bulbs;
 use crate::scenes::pcg::Pcg32;
 use crate::scenes::{self, Scene};
 
 /// Calls of a case that is counted a call.
-const CALLS: usize = 256;
+pub(super) const CALLS: usize = 256;
 /// Numbers that are tried at a point to find out whether it is lit.
 const TRIES: usize = 64;
 
@@ -67,6 +68,8 @@ pub(crate) const ALL: &[Case] = &[
     },
     Case { name: "quad/nee", calls: CALLS, run: || next_event("quad") },
     Case { name: "cornell/nee", calls: CALLS, run: cornell },
+    Case { name: "bulbs/nee", calls: CALLS, run: bulbs::spheres },
+    Case { name: "bulbs-triangles/nee", calls: CALLS, run: bulbs::triangles },
     Case { name: "quad/lobe-nee", calls: CALLS, run: || next_event_lobe("quad") },
     Case { name: "window/sample", calls: CALLS, run: || sample("window") },
     Case {
@@ -132,7 +135,7 @@ const NOWHERE: Hit = Hit::new(TriangleId::new(MeshId::from_index(u32::MAX), 0), 
 
 /// Everything in here is counted, and nothing else.
 #[inline(never)]
-fn measured(mut call: impl FnMut(usize)) {
+pub(super) fn measured(mut call: impl FnMut(usize)) {
     for i in 0..CALLS {
         call(i);
     }
@@ -167,7 +170,7 @@ fn builder(scene: &Scene) -> LightSamplerBuilder<'_> {
     builder
 }
 
-fn numbers() -> Vec<[f32; 3]> {
+pub(super) fn numbers() -> Vec<[f32; 3]> {
     let mut pcg = Pcg32::new(3, 3);
     (0..CALLS).map(|_| pcg.uniform3()).collect()
 }

@@ -11,6 +11,7 @@
 //!
 //! The program runs itself under Valgrind once for each case, and has what happens inside of [`measured`] counted.
 
+mod bulbs;
 mod cases;
 
 #[expect(dead_code, reason = "the quality bench uses the rest")]
