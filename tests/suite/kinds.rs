@@ -19,6 +19,7 @@ use fanlight::{
 };
 use glam::{DVec3, Vec3};
 
+mod spheres;
 mod twin;
 
 use twin::{Kind, Twin, disk, hollow_sphere, over_cap, point, sphere, spot, tube, weight};
