@@ -5,6 +5,7 @@ use crate::common::lights::{ARITIES, aligned, build, sample_split};
 use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LightMesh, Scene, Sky, random_point};
+use crate::common::statistics::{chi_square, sidak};
 use crate::common::tier::{agreement, few, some, tier};
 use fanlight::{
     Environment, Filter, LightSample, LightSampler, LightSamplerView, Mesh, SampledLight, ShadingPoint, Splitting,
@@ -183,6 +184,38 @@ fn probabilities_add_up_for_any_table() {
             let blind =
                 scene.triangles().map(|t| f64::from(lights.at(&x).pmf(crate::common::density::id(t)))).sum::<f64>();
             assert!((sum - 1.0).abs() < 1e-5 || sum < 1.0 && blind < 1.0 - 1e-7, "{sum}, {blind} without");
+        }
+    }
+}
+
+/// Samples fall on triangles as their probabilities say, under any table.
+#[test]
+fn triangles_are_chosen_as_their_probabilities_say_for_any_table() {
+    let numbers = some(30);
+    let points = 4;
+    for &number in &numbers {
+        let mut pcg = Pcg32::new(number as u64, 95);
+        let content = Content { triangles: 60, textured: false, sky: 0, two_sided: true };
+        let scene = Scene::random(&mut pcg, content);
+        let lights = build(&scene, ARITIES[number % ARITIES.len()]);
+        let visibility = with_factors(&learn(&lights, 1000), HOSTILE[number % 4], &mut pcg);
+        let view = lights.with_visibility(&visibility).expect("it was learned here");
+        let ids: Vec<_> = scene.triangles().map(crate::common::density::id).collect();
+        for i in 0..points {
+            let at = view.at(&random_point(&mut pcg, i));
+            let count = tier().histogram / 10;
+            let mut observed = vec![0.0; ids.len() + 1];
+            for _ in 0..count {
+                let sample = at.sample(pcg.cube());
+                let place = sample.and_then(|s| ids.iter().position(|id| *id == s.hit().expect("a triangle").triangle));
+                observed[place.unwrap_or(ids.len())] += 1.0;
+            }
+            let mut expected: Vec<f64> = ids.iter().map(|id| count as f64 * f64::from(at.pmf(*id))).collect();
+            let none = count as f64 - expected.iter().sum::<f64>();
+            // Rounding is no cell.
+            expected.push(if none > 1e-4 * count as f64 { none } else { observed[ids.len()] });
+            let (p, dump) = chi_square(&observed, &expected);
+            assert!(p > sidak(0.01, points * numbers.len()), "{number}, {i}: p = {p:e}\n{dump}");
         }
     }
 }
