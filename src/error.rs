@@ -121,6 +121,8 @@ pub(crate) enum ErrorKind {
     Arity { what: &'static str, found: u32, expected: &'static [u32] },
     /// A table of visibility that was learned for another sampler.
     Visibility { what: &'static str, found: usize, expected: usize },
+    /// Counts of visibility with other regions than those of the learner.
+    VisibilityRegions { node: usize, found: Box<str>, expected: Box<str> },
     /// Bytes that do not hold what they should.
     Bytes { what: &'static str, at: usize, found: u64, expected: u64 },
 }
@@ -252,6 +254,9 @@ impl fmt::Display for ErrorKind {
             }
             ErrorKind::Visibility { what, found, expected } => {
                 write!(f, "visibility: it was learned for {found} {what}, but there are {expected}")
+            }
+            ErrorKind::VisibilityRegions { node, found, expected } => {
+                write!(f, "visibility: it was counted with node {node} over regions as {found}, but it is {expected}")
             }
             ErrorKind::Bytes { what, at, found, expected } => {
                 write!(f, "bytes: {what} at {at} is {found:#x}, expected {expected:#x}")

@@ -11,6 +11,7 @@ use crate::parallel;
 use crate::progress::{Progress, Report};
 use crate::receiver::ShadingPoint;
 use crate::record::{LightSample, SampledLight};
+use crate::technique::LightScene;
 use crate::visibility::{
     Counts, LeafKey, RegionBuilder, RegionFactors, Visibility, VisibilityHeader, VisibilityView, distill, orientation,
 };
@@ -85,13 +86,7 @@ impl<'a> LightSamplerView<'a> {
     /// again. After a [`refit`](LightSampler::refit) a table can still be used. The numbers alone are compared. A table
     /// of another scene that agrees in these makes noise, but no error.
     pub fn with_visibility(self, visibility: VisibilityView<'a>) -> Result<Self, Error> {
-        let expected = header(&self);
-        let differ = |what, found, expected| {
-            let (found, expected) = (found as usize, expected as usize);
-            if found == expected { Ok(()) } else { Err(Error(ErrorKind::Visibility { what, found, expected })) }
-        };
-        differ("nodes of the light tree", visibility.header.nodes, expected.nodes)?;
-        differ("lights", visibility.header.leaves, expected.leaves)?;
+        same_lights(visibility.header, header(&self.scene))?;
         Ok(Self { visibility: Some(visibility), ..self })
     }
 
@@ -111,9 +106,21 @@ impl<'a> LightSamplerView<'a> {
     }
 }
 
-fn header(lights: &LightSamplerView<'_>) -> VisibilityHeader {
-    let tlas = &lights.scene.tlas;
+fn header(scene: &LightScene<'_>) -> VisibilityHeader {
+    let tlas = &scene.tlas;
     VisibilityHeader { nodes: tlas.node_count() as u32, leaves: tlas.leaves.len() as u32 }
+}
+
+/// `Ok` if what was learned is of light trees with the expected numbers.
+fn same_lights(found: VisibilityHeader, expected: VisibilityHeader) -> Result<(), Error> {
+    same("nodes of the light tree", found.nodes, expected.nodes)?;
+    same("lights", found.leaves, expected.leaves)
+}
+
+/// `Ok` if a number that something was learned for is the expected one.
+fn same(what: &'static str, found: u32, expected: u32) -> Result<(), Error> {
+    let (found, expected) = (found as usize, expected as usize);
+    if found == expected { Ok(()) } else { Err(Error(ErrorKind::Visibility { what, found, expected })) }
 }
 
 /// Learns what walls hide from what a host reports.
@@ -186,7 +193,7 @@ impl VisibilityCounters {
     /// Report samples whether they got through or not, or only every nth of them; but do not choose by the result. For
     /// a sample on a portal, what counts is whether the environment is seen along its direction. `here` is the sampler
     /// that drew the sample. Samples of lights that it does not have, and those at positions that are not finite, are
-    /// ignored.
+    /// ignored, as are all of a sampler whose light tree has another number of nodes or of lights than the learner's.
     ///
     /// Where the sample got through several portals, what it says is shared among them: it counts most for the one that
     /// finds the direction most easily, since samples on the others are not needed for it.
@@ -196,7 +203,8 @@ impl VisibilityCounters {
     /// density of a direction.
     pub fn report(&mut self, here: &PointSampler<'_>, sample: &LightSample, transmittance: f32) {
         let (x, scene) = (&here.at.x, &here.at.scene);
-        if scene.tlas.node_count() != self.header.nodes as usize {
+        // Both numbers: a leaf that the learner's tree does not have would have no way to its root.
+        if header(scene) != self.header {
             return;
         }
         let Some(region) = self.regions.find(orientation(&x.receiver), x.position) else { return };
@@ -234,9 +242,12 @@ impl VisibilityCounters {
     ///
     /// # Errors
     ///
-    /// If they were made by another learner, or before its regions were divided.
+    /// If they differ in the number of nodes or lights, in how often the learner had published, or in its regions.
+    /// Counters of another learner that agree in all of these mean the same, and are added.
     pub fn merge(&mut self, other: &Self) -> Result<(), Error> {
-        check(self.header, self.generation, other)?;
+        same_lights(other.header, self.header)?;
+        same("published tables", other.generation, self.generation)?;
+        same_regions(&other.regions, &self.regions)?;
         self.regions.add(&other.regions.extents);
         self.counts.merge(&other.counts);
         Ok(())
@@ -249,15 +260,13 @@ impl VisibilityCounters {
     }
 }
 
-/// Whether counters belong to a learner as it is now.
-fn check(header: VisibilityHeader, generation: u32, counters: &VisibilityCounters) -> Result<(), Error> {
-    let differ = |what, found: u32, expected: u32| {
-        let (found, expected) = (found as usize, expected as usize);
-        if found == expected { Ok(()) } else { Err(Error(ErrorKind::Visibility { what, found, expected })) }
-    };
-    differ("nodes of the light tree", counters.header.nodes, header.nodes)?;
-    differ("lights", counters.header.leaves, header.leaves)?;
-    differ("published tables", counters.generation, generation)
+/// `Ok` if regions have the same numbers at the same places. Otherwise counts would land elsewhere, or nowhere.
+fn same_regions(found: &RegionBuilder, expected: &RegionBuilder) -> Result<(), Error> {
+    same("regions", found.len() as u32, expected.len() as u32)?;
+    match found.difference(expected) {
+        None => Ok(()),
+        Some((node, [found, expected])) => Err(Error(ErrorKind::VisibilityRegions { node, found, expected })),
+    }
 }
 
 impl VisibilityLearner {
@@ -265,7 +274,7 @@ impl VisibilityLearner {
     #[must_use]
     pub fn new(lights: &LightSamplerView<'_>) -> Self {
         Self {
-            header: header(lights),
+            header: header(&lights.scene),
             regions: RegionBuilder::new(),
             counts: Counts::default(),
             generation: 0,
@@ -298,9 +307,13 @@ impl VisibilityLearner {
     ///
     /// # Errors
     ///
-    /// If they were made by another learner, or before the last [`publish`](Self::publish).
+    /// If they were made before the last [`publish`](Self::publish), or by a learner that differs from this one in the
+    /// number of nodes or lights, in how often it has published, or in its regions. Counters of another learner that
+    /// agrees in all of these mean the same, and are added.
     pub fn merge(&mut self, counters: &VisibilityCounters) -> Result<(), Error> {
-        check(self.header, self.generation, counters)?;
+        same_lights(counters.header, self.header)?;
+        same("published tables", counters.generation, self.generation)?;
+        same_regions(&counters.regions, &self.regions)?;
         self.regions.add(&counters.regions.extents);
         self.counts.merge(&counters.counts);
         Ok(())
@@ -310,14 +323,10 @@ impl VisibilityLearner {
     ///
     /// # Errors
     ///
-    /// If the sampler is not the one that the learner was made for, by the numbers of nodes and lights.
+    /// If the light tree of the sampler has another number of nodes or of lights than that of the one that the learner
+    /// was made for. The numbers alone are compared, as in [`LightSamplerView::with_visibility`].
     pub fn publish(&mut self, lights: &LightSamplerView<'_>) -> Result<Visibility, Error> {
-        let expected = self.header;
-        let found = header(lights);
-        if found != expected {
-            let (found, expected) = (found.leaves as usize, expected.leaves as usize);
-            return Err(Error(ErrorKind::Visibility { what: "lights", found, expected }));
-        }
+        same_lights(self.header, header(&lights.scene))?;
         self.regions.surround();
         let visibility = distill(&self.regions, &self.counts, &lights.scene.tlas, self.max_bytes);
         self.divide();

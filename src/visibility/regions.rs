@@ -3,6 +3,8 @@
 //! Each orientation has a tree of planes perpendicular to the axes. A region is divided in the middle of the longest
 //! side of the box around its reports, so that empty space costs a few planes at most, however large the scene.
 
+use alloc::boxed::Box;
+use alloc::string::ToString;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -93,6 +95,12 @@ impl RegionBuilder {
     /// Number of regions.
     pub(crate) fn len(&self) -> usize {
         self.leaves.len()
+    }
+
+    /// Returns the first node in which as many other regions differ, and what the node is in these and in those.
+    pub(crate) fn difference(&self, other: &Self) -> Option<(usize, [Box<str>; 2])> {
+        let node = self.nodes.iter().zip(&other.nodes).position(|(own, other)| own != other)?;
+        Some((node, [self, other].map(|regions| regions.nodes[node].to_string().into())))
     }
 
     /// Returns the region of a position of an orientation.

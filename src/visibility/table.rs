@@ -1,6 +1,7 @@
 //! The frozen table, as arrays of plain data.
 
 use alloc::vec::Vec;
+use core::fmt;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -44,6 +45,16 @@ pub(crate) struct RegionNode {
 }
 
 const _: () = assert!(size_of::<RegionNode>() == 12);
+
+impl fmt::Display for RegionNode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, plane, first } = self;
+        match *kind {
+            REGION => write!(f, "region {first}"),
+            axis => write!(f, "the plane {plane} of axis {axis} above node {first}"),
+        }
+    }
+}
 
 /// Marks a node that is a region. *Format.*
 pub(crate) const REGION: u32 = 3;

@@ -8,8 +8,8 @@ use crate::common::scene::{Content, LightMesh, Scene, Sky, random_point};
 use crate::common::statistics::{chi_square, sidak};
 use crate::common::tier::{agreement, few, some, tier};
 use fanlight::{
-    Environment, Filter, LightSample, LightSampler, LightSamplerView, Mesh, SampledLight, ShadingPoint, Splitting,
-    Visibility, VisibilityCounters, VisibilityLearner, VisibilityView,
+    Arity, Environment, Filter, LightSample, LightSampler, LightSamplerView, Mesh, SampledLight, ShadingPoint,
+    Splitting, Visibility, VisibilityCounters, VisibilityLearner, VisibilityView,
 };
 use glam::Vec3;
 
@@ -313,6 +313,83 @@ fn a_table_of_another_sampler_is_refused() {
     let mut learner = VisibilityLearner::new(&lights.as_view());
     assert!(learner.publish(&others.as_view()).is_err());
     assert!(learner.merge(&VisibilityLearner::new(&others.as_view()).counters()).is_err());
+}
+
+/// Lamps in a row, all below one root of 16 lanes.
+fn row(lamps: usize) -> LightSampler {
+    let mut builder = LightSampler::builder().arity(Arity::Sixteen);
+    for i in 0..lamps {
+        let corner = Vec3::new(2.0 * i as f32, 0.0, 2.0);
+        let corners = [corner, corner + Vec3::Y, corner + Vec3::X];
+        builder.add_mesh(&Mesh::emitter(&corners, &[[0, 1, 2]])).expect("valid");
+    }
+    builder.build().expect("small")
+}
+
+/// Reports `count` samples at points below the whole row.
+fn report(counters: &mut VisibilityCounters, lights: &LightSampler, count: u64) {
+    for i in 0..count {
+        let mut pcg = Pcg32::new(i, 99);
+        let x = ShadingPoint::surface(Vec3::new(28.0 * pcg.f32(), pcg.f32(), 0.0), Vec3::Z);
+        let here = lights.at(&x);
+        if let Some(sample) = here.sample(pcg.cube()) {
+            counters.report(&here, &sample, pcg.f32());
+        }
+    }
+}
+
+/// Trees with as many nodes, of which one has more leaves.
+#[test]
+fn reports_of_another_sampler_are_ignored() {
+    let (lights, others) = (row(10), row(14));
+    let mut learner = VisibilityLearner::new(&lights.as_view());
+    let mut counters = learner.counters();
+    report(&mut counters, &others, 400);
+    learner.merge(&counters).expect("it is of this learner");
+    let visibility = learner.publish(&lights.as_view()).expect("the sampler is the same");
+    assert_eq!(visibility.region_count(), 0);
+}
+
+/// Counters of a learner that has divided space, for one that has not, and the other way round.
+#[test]
+fn counters_with_other_regions_are_refused() {
+    let lights = row(10);
+    let learner = |reports: u64| {
+        let mut learner = VisibilityLearner::new(&lights.as_view());
+        let mut counters = learner.counters();
+        report(&mut counters, &lights, reports);
+        learner.merge(&counters).expect("it is of this learner");
+        learner.publish(&lights.as_view()).expect("the sampler is the same");
+        learner
+    };
+    let (mut few, mut many) = (learner(10), learner(2000));
+    let [mut of_few, mut of_many] = [few.counters(), many.counters()];
+    report(&mut of_few, &lights, 2000);
+    report(&mut of_many, &lights, 2000);
+    let message = few.merge(&of_many).expect_err("it has more regions").to_string();
+    assert!(message.contains("8 regions") && message.contains("there are 7"), "{message}");
+    assert!(many.merge(&of_few).is_err() && of_few.merge(&of_many).is_err());
+    for (learner, counters) in [(&mut few, &of_few), (&mut many, &of_many)] {
+        learner.merge(counters).expect("it is of this learner");
+        assert!(learner.publish(&lights.as_view()).is_ok());
+    }
+}
+
+/// Learners that have divided space at different places.
+#[test]
+fn counters_with_as_many_other_regions_are_refused() {
+    let lights = row(10);
+    let [mut one, mut other] = [600, 2000].map(|reports| {
+        let mut learner = VisibilityLearner::new(&lights.as_view());
+        let mut counters = learner.counters();
+        report(&mut counters, &lights, reports);
+        learner.merge(&counters).expect("it is of this learner");
+        learner.publish(&lights.as_view()).expect("the sampler is the same");
+        learner
+    });
+    let message = one.merge(&other.counters()).expect_err("its plane is elsewhere").to_string();
+    assert!(message.contains("node ") && message.contains("the plane "), "{message}");
+    assert!(other.merge(&one.counters()).is_err());
 }
 
 #[test]
