@@ -202,17 +202,17 @@ impl Distiller<'_> {
         let mut counts: Vec<Count> = Vec::new();
         let mut from = 0;
         while let Some(first) = records.get(from) {
-            let mut sum = Record { squares: 0, asked: 0, seen: 0, ..*first };
-            while let Some(record) = records.get(from).filter(|record| record.leaf == sum.leaf) {
-                sum.add(record);
+            // Wider than records: those of many regions together may exceed what one of them holds.
+            let (LeafKey(leaf), mut sums) = (first.leaf, [0u64; 3]);
+            while let Some(record) = records.get(from).filter(|record| record.leaf == LeafKey(leaf)) {
+                let more = [record.squares, record.asked, record.seen];
+                sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += u64::from(more));
                 from += 1;
             }
             let mut push = |key: u32, lane: u32| {
-                let [squares, asked, seen] =
-                    [sum.squares, sum.asked, sum.seen].map(|count| count as f32 * (1.0 / UNIT));
+                let [squares, asked, seen] = sums.map(|sum| sum as f32 * (1.0 / UNIT));
                 counts.push(Count { slot: slot(key, lane), squares, asked, seen });
             };
-            let LeafKey(leaf) = sum.leaf;
             if leaf & SKY != 0 {
                 let region = leaf & !SKY;
                 push(SKY, 0);
@@ -247,32 +247,44 @@ impl Distiller<'_> {
     fn believe(&self, counts: &[Count], prior: Option<&Beliefs>) -> Beliefs {
         let all = self.asked(counts);
         let mut beliefs = Beliefs { slots: union(counts, prior) };
-        let (mut first, mut counted) = (0, 0);
-        while let Some(Belief { slot, .. }) = beliefs.slots.get(first) {
-            let key = key_of(*slot);
-            let last = first + beliefs.slots[first..].partition_point(|belief| key_of(belief.slot) == key);
-            let end = counted + counts[counted..].partition_point(|count| key_of(count.slot) == key);
-            self.shrink(&mut beliefs, first..last, &counts[counted..end], all, prior);
-            (first, counted) = (last, end);
+        for lanes in self.downwards(&beliefs.slots, |belief| key_of(belief.slot)) {
+            let key = key_of(beliefs.slots[lanes.start].slot);
+            let start = counts.partition_point(|count| key_of(count.slot) < key);
+            let of_node = counts[start..].chunk_by(|a, b| key_of(a.slot) == key_of(b.slot)).next().unwrap_or(&[]);
+            let is_counted = of_node.first().is_some_and(|count| key_of(count.slot) == key);
+            self.shrink(&mut beliefs, lanes, if is_counted { of_node } else { &[] }, all, prior);
         }
         // Lanes that are rarely asked about count if they are most of what gets through.
         let is_first = |belief: &&Belief| self.parent(key_of(belief.slot)).is_none();
         let chosen: f32 = beliefs.slots.iter().filter(is_first).map(|belief| belief.mass * belief.factor).sum();
         beliefs.slots.retain(|belief| belief.mass.max(belief.mass * belief.factor / chosen) >= LEAST_MASS);
         // The factor of a lane is the mean over what is below it, from the leaves upwards.
-        let mut end = beliefs.slots.len();
-        while end > 0 {
-            let key = key_of(beliefs.slots[end - 1].slot);
-            let start = beliefs.slots[..end].partition_point(|belief| key_of(belief.slot) < key);
-            let mean = mean_factor(&beliefs.slots[start..end]);
-            if let Some(parent) = self.parent(key) {
-                if let Ok(at) = beliefs.slots.binary_search_by_key(&parent, |belief| belief.slot) {
-                    beliefs.slots[at].factor = mean;
-                }
+        for lanes in self.downwards(&beliefs.slots, |belief| key_of(belief.slot)).into_iter().rev() {
+            let Some(parent) = self.parent(key_of(beliefs.slots[lanes.start].slot)) else { continue };
+            let mean = mean_factor(&beliefs.slots[lanes]);
+            if let Ok(at) = beliefs.slots.binary_search_by_key(&parent, |belief| belief.slot) {
+                beliefs.slots[at].factor = mean;
             }
-            end = start;
         }
         beliefs
+    }
+
+    /// Returns the ranges of equal keys, those of nodes nearer to the root first: edits reuse numbers of nodes, so that
+    /// a child's may be below its parent's.
+    fn downwards<T>(&self, sorted: &[T], key: impl Fn(&T) -> u32) -> Vec<Range<usize>> {
+        let mut start = 0;
+        let ranges = sorted.chunk_by(|a, b| key(a) == key(b)).map(|chunk| {
+            start += chunk.len();
+            start - chunk.len()..start
+        });
+        let mut ranges: Vec<_> = ranges.collect();
+        ranges.sort_by_cached_key(|range| self.depth(key(&sorted[range.start])));
+        ranges
+    }
+
+    /// Number of nodes above a node.
+    fn depth(&self, key: u32) -> usize {
+        core::iter::successors(self.parent(key), |above| self.parent(key_of(*above))).count()
     }
 
     /// Forms the beliefs of one node's lanes, those above being known: shares that got through, shrunk towards what is
@@ -344,9 +356,9 @@ impl Distiller<'_> {
             entries.push(FactorEntry { region, key, factors, gain });
         }
         // An entry is kept where one below it is.
-        for i in (first..entries.len()).rev() {
-            let Some(parent) = self.parent(entries[i].key) else { continue };
-            let gain = entries[i].gain;
+        for range in self.downwards(&entries[first..], |entry| entry.key).into_iter().rev() {
+            let FactorEntry { key, gain, .. } = entries[first + range.start];
+            let Some(parent) = self.parent(key) else { continue };
             let above = entries[first..].binary_search_by_key(&key_of(parent), |entry| entry.key);
             if let Ok(above) = above {
                 let entry = &mut entries[first + above];

@@ -392,6 +392,42 @@ fn counters_with_as_many_other_regions_are_refused() {
     assert!(other.merge(&one.counters()).is_err());
 }
 
+/// An edited sampler learns what its bytes learn, whose nodes are in order again.
+#[test]
+fn the_numbers_of_nodes_do_not_matter() {
+    let (mut all, mut different) = (0, 0);
+    for seed in 0..8 {
+        let (_, lights) = crate::edits::edited(seed, 0, 30);
+        let words = aligned(&lights.to_bytes());
+        let loaded = LightSamplerView::from_bytes(bytemuck::cast_slice(&words)).expect("its own bytes load");
+        let views = [lights.as_view(), loaded];
+        let queries = (0..6000).map(|i| {
+            let mut pcg = Pcg32::new(i, 100 + seed);
+            (ShadingPoint::volume(4.0 * Vec3::from_array(pcg.cube()) - 2.0), pcg.cube())
+        });
+        let queries: Vec<_> = queries.collect();
+        let tables = views.map(|view| {
+            let mut learner = VisibilityLearner::new(&view);
+            let mut counters = learner.counters();
+            for (x, u) in &queries {
+                let here = view.at(x);
+                let Some(sample) = here.sample(*u) else { continue };
+                counters.report(&here, &sample, f32::from(u8::from((x.position.x > 0.0) == (sample.position.x > 0.0))));
+            }
+            learner.merge(&counters).expect("it is of this learner");
+            learner.publish(&view).expect("the sampler is the same")
+        });
+        let [own, other] = [0, 1].map(|k| views[k].with_visibility(tables[k].as_view()).expect("learned here"));
+        for (x, u) in &queries {
+            let [own, other] = [own, other].map(|view| view.at(x).sample(*u).map_or(0.0, |sample| sample.pmf));
+            all += 1;
+            different += usize::from((own - other).abs() > 1e-3 * own);
+        }
+    }
+    // Sums in another order may round a factor to the next code.
+    assert!(200 * different < all, "{different} of {all}");
+}
+
 #[test]
 fn learning_can_be_cancelled_and_shows_progress() {
     let mut pcg = Pcg32::new(6, 97);
