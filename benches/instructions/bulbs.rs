@@ -1,11 +1,9 @@
 //! Fifty bulbs in a closed room, as spheres and as the triangles that a host without spheres has.
 
-use core::hint::black_box;
-
 use fanlight::{LightSampler, Mesh, ShadingPoint, SphereLight, Weight};
 use glam::Vec3;
 
-use super::cases::{CALLS, measured, numbers};
+use super::cases::{CALLS, next_event_to_emitters};
 use crate::scenes::pcg::Pcg32;
 
 const RADIUS: f32 = 0.04;
@@ -47,14 +45,7 @@ fn next_event(add: impl Fn(Vec3, f32, &mut fanlight::LightSamplerBuilder<'_>)) {
             }
         })
         .collect();
-    let numbers = numbers();
-    measured(|i| {
-        let here = lights.at(&points[i]);
-        if let Some(sample) = here.sample(numbers[i]) {
-            black_box(sample.pdf);
-            black_box(sample);
-        }
-    });
+    next_event_to_emitters(&lights, &points);
 }
 
 /// An icosahedron divided once: unit vectors, and triangles that face outward.

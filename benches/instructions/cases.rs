@@ -135,7 +135,7 @@ const NOWHERE: Hit = Hit::new(TriangleId::new(MeshId::from_index(u32::MAX), 0), 
 
 /// Everything in here is counted, and nothing else.
 #[inline(never)]
-pub(super) fn measured(mut call: impl FnMut(usize)) {
+fn measured(mut call: impl FnMut(usize)) {
     for i in 0..CALLS {
         call(i);
     }
@@ -170,7 +170,7 @@ fn builder(scene: &Scene) -> LightSamplerBuilder<'_> {
     builder
 }
 
-pub(super) fn numbers() -> Vec<[f32; 3]> {
+fn numbers() -> Vec<[f32; 3]> {
     let mut pcg = Pcg32::new(3, 3);
     (0..CALLS).map(|_| pcg.uniform3()).collect()
 }
@@ -308,6 +308,11 @@ fn cornell() {
             }
         })
         .collect();
+    next_event_to_emitters(&lights, &points);
+}
+
+/// Calls of a host with emitters alone, whose samples have the density that it needs.
+pub(super) fn next_event_to_emitters(lights: &LightSampler, points: &[ShadingPoint]) {
     let numbers = numbers();
     measured(|i| {
         let here = lights.at(&points[i]);

@@ -393,8 +393,8 @@ fn photons_bring_what_light_samples_bring() {
     assert!((a - b).abs() < 4.0 * error && error < 0.03 * b, "{a} and {b} ± {error}");
 }
 
-/// Photons of a bulb beside a sun that sends ten million times as much come as often as their density says. The bulb is
-/// behind the very last first numbers.
+/// Photons of a bulb beside a sun of up to five million times its power come as often as their density says. The last
+/// values of the first number choose the bulb.
 #[test]
 fn photons_of_weak_lights_come_beside_strong_ones() {
     let build = |irradiance| {
