@@ -142,6 +142,29 @@ fn batch(criterion: &mut Criterion) {
     }
 }
 
+/// Eight candidates at one point: by resampling, which interleaves their walks, and one after the other.
+fn candidates(criterion: &mut Criterion) {
+    let (points, numbers) = (points(), numbers());
+    let slices: Vec<&[[f32; 3]]> = numbers.chunks_exact(8).collect();
+    for n in [1_000, 100_000, 1_000_000] {
+        let sampler = build(&cloud(n));
+        let mut group = criterion.benchmark_group(format!("candidates/cloud-{n}"));
+        let at = |i: usize| sampler.at(&points[8 * i]);
+        group.bench_function("single", |b| {
+            in_circle(b, slices.len(), |i| {
+                let here = at(i);
+                slices[i].iter().filter_map(|u| here.sample(*u)).map(|sample| sample.distance).sum::<f32>()
+            });
+        });
+        group.bench_function("resampled", |b| {
+            in_circle(b, slices.len(), |i| {
+                at(i).sample_resampled(slices[i], 0.5, |sample| sample.distance).map(|chosen| chosen.weight)
+            });
+        });
+        group.finish();
+    }
+}
+
 /// A sky that brightens towards the zenith, with a sun of half a degree.
 fn environment(criterion: &mut Criterion) {
     const SIZE: usize = 1024;
@@ -185,5 +208,6 @@ fn main() {
     environment(&mut criterion);
     lights(&mut criterion);
     batch(&mut criterion);
+    candidates(&mut criterion);
     criterion.final_summary();
 }

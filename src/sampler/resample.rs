@@ -40,7 +40,8 @@ pub struct ResampledLight {
 
 impl PointSampler<'_> {
     /// Draws a candidate for each element of `numbers`, as [`sample`](Self::sample) does, and chooses one in proportion
-    /// to `target` over its density. `choice` is uniform in `[0, 1)`.
+    /// to `target` over its density. `choice` is uniform in `[0, 1)`. Where there are many lights, the candidates' walks
+    /// through the tree are interleaved.
     ///
     /// The target is the host's: what a candidate is expected to contribute per solid angle if nothing is in between,
     /// such as luminance of light times BSDF times cosine. It must be positive wherever the true contribution can be.
@@ -98,11 +99,11 @@ impl PointSampler<'_> {
     ) -> Option<ResampledLight> {
         let mut choice = Variate::new(choice, seed(&[choice]));
         let (mut chosen, mut sum) = (None, 0.0);
-        for u in numbers {
-            let Some(sample) = self.sample(*u) else { continue };
+        self.sample_all(numbers, |candidate| {
+            let Some(sample) = candidate else { return };
             let value = f64::from(at_most(at_least(target(&sample), 0.0), f32::MAX));
             if value == 0.0 {
-                continue;
+                return;
             }
             let weight = (value / f64::from(self.density_of_contribution(&sample))).max(LEAST_WEIGHT);
             // A reservoir of one: the new candidate takes the place with the probability of its share.
@@ -115,7 +116,7 @@ impl PointSampler<'_> {
                 choice.stretch(offset - weight, sum, total);
             }
             sum = total;
-        }
+        });
         chosen.map(|(sample, value)| {
             let weight = sum / (numbers.len() as f64 * value);
             ResampledLight { sample, weight: (weight as f32).clamp(f32::MIN_POSITIVE, f32::MAX) }

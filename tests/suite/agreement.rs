@@ -262,6 +262,37 @@ fn samples_are_reproducible_to_the_bit() {
     assert!(lit + 1 >= numbers.len(), "only {lit} of {} scenes are lit", numbers.len());
 }
 
+/// The candidates that a target gets are the samples of the same numbers, to the bit and in their order, although their
+/// walks are interleaved.
+#[test]
+fn candidates_of_resampling_are_samples() {
+    let mut candidates = 0;
+    let scenes = some(40);
+    for &number in &scenes {
+        let mut pcg = Pcg32::new(number as u64, 22);
+        let scene = random_scene(number, &mut pcg);
+        let lights = build(&scene, ARITIES[number % ARITIES.len()]);
+        for point in 0..30 {
+            let make = [shading_point, shading_point_with_lobe, shading_point_with_microfacets][point % 3];
+            let at = lights.at(&make(number + point, &scene, &mut pcg));
+            // Slices that end within a group of interleaved walks, and at its end.
+            let numbers: Vec<[f32; 3]> =
+                (0..[1, 7, 8, 13, 32][point % 5]).map(|_| core::array::from_fn(|_| hostile(&mut pcg))).collect();
+            let expected: Vec<String> =
+                numbers.iter().filter_map(|u| at.sample(*u)).map(|sample| format!("{sample:?}")).collect();
+            let mut found = Vec::new();
+            let chosen = at.sample_resampled(&numbers, pcg.f32(), |sample| {
+                found.push(format!("{sample:?}"));
+                1.0
+            });
+            assert_eq!(found, expected, "{}", scene.name);
+            assert_eq!(chosen.is_some(), !found.is_empty());
+            candidates += found.len();
+        }
+    }
+    assert!(candidates > 100 * scenes.len(), "only {candidates} candidates");
+}
+
 /// Two openings behind each other: the density of a direction is the sum over both, and more than either.
 #[test]
 fn the_density_of_a_direction_counts_every_portal() {

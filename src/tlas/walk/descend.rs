@@ -220,12 +220,15 @@ impl<const N: usize> WideTree<'_, N> {
     }
 
     /// Draws a leaf for each walk, which then holds it.
-    pub(crate) fn sample_many(&self, walks: &mut [Descent<impl LeafOracle, impl Lobe>]) {
-        if self.nodes.is_empty() {
+    pub(crate) fn sample_many(&self, walks: &mut [Descent<impl LeafOracle, impl Lobe>], first: Option<&FirstWeights>) {
+        let Some(root) = self.nodes.first() else {
             for walk in walks {
                 walk.end = Some(self.single_leaf(&walk.oracle).then_some(0));
             }
             return;
+        };
+        if let Some(weights) = first {
+            walks.iter_mut().for_each(|walk| walk.choose(root, &weights.lanes()));
         }
         InstructionSet::best().run(InterleavedWalks { tlas: self, walks });
     }

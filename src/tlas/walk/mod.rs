@@ -42,9 +42,14 @@ impl TlasView<'_> {
         for_arity!(self, tree => tree.sample(oracle, first, u))
     }
 
-    /// Draws a leaf for each descent, as [`Self::sample`] does without `first`. Each descent then holds what was drawn.
-    pub(crate) fn sample_many(&self, descents: &mut [Descent<impl LeafOracle, impl Lobe>]) {
-        for_arity!(self, tree => tree.sample_many(descents));
+    /// Draws a leaf for each descent, as [`Self::sample`] does. Each descent then holds what was drawn. `first` are
+    /// [`Self::first_weights`] of all descents, where they begin at one shading point.
+    pub(crate) fn sample_many(
+        &self,
+        descents: &mut [Descent<impl LeafOracle, impl Lobe>],
+        first: Option<&FirstWeights>,
+    ) {
+        for_arity!(self, tree => tree.sample_many(descents, first));
     }
 
     /// Returns the probability with which [`Self::sample`] draws a leaf.
