@@ -4,8 +4,8 @@ use alloc::collections::BinaryHeap;
 use alloc::vec::Vec;
 use core::cmp::Ordering;
 
+use super::feature_clusters::{TexelCluster, radius};
 use super::feature_texel::FeatureTexel;
-use super::features::TexelCluster;
 
 /// Relative variance within the blocks of a feature up to which they stay as they are. Chosen on captured suns, not
 /// swept.
@@ -96,7 +96,7 @@ pub(super) fn blocks(
     let whole = Block { level: 0, code: 0, start: 0, end: texels.len(), key: 0.0 };
     let total: f64 = texels.iter().map(|&(_, v)| f64::from(v)).sum();
     // What has to be divided whatever it costs.
-    let radius = super::features::radius(depth, texels);
+    let radius = radius(depth, texels);
     let (mut open, mut heap, mut finest) = (Vec::from([whole]), BinaryHeap::new(), Vec::new());
     while let Some(block) = open.pop() {
         if block.level == depth {

@@ -1,6 +1,5 @@
 //! The image that a host builds an environment from.
 
-use super::source::Edges;
 use crate::record::Filter;
 
 /// What a latitude-longitude image holds beyond its poles, for a host that interpolates between texels.
@@ -16,6 +15,15 @@ pub enum Poles {
     /// Rows continue on the other side: the row beyond a pole is the row next to the pole, half a turn away. If the
     /// width is odd, it is the mean of the two nearest columns.
     Across,
+}
+
+/// How the image continues beyond its edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Edges {
+    /// A latitude-longitude image: columns repeat, rows continue beyond the poles as the host says.
+    LatLong(Poles),
+    /// An equal-area image: the octahedral map's copies, rotated by half a turn.
+    EqualArea,
 }
 
 /// The luminance of an environment, as the host has it, and how the host reads it.

@@ -9,6 +9,7 @@ mod cone;
 mod cones;
 mod descend;
 mod feature_blocks;
+mod feature_clusters;
 mod feature_sampling;
 mod feature_texel;
 mod feature_tree;

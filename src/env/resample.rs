@@ -1,8 +1,9 @@
 //! Resampling of a host's image to an equal-area image whose size is a power of two, by area: no flux is lost.
 
+use super::image::Edges;
 use super::lat_long::{CellCoverage, LatLong};
 use super::pyramid::level_start;
-use super::source::{Edges, EnvironmentSource};
+use super::source::EnvironmentSource;
 use super::{MAX_RADIANCE, MIN_RADIANCE};
 use crate::parallel::for_each_chunk;
 use crate::progress::{Cancelled, Progress};

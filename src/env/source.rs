@@ -1,6 +1,6 @@
 //! The image that an environment is built from, as its host sees it.
 
-use super::image::{EnvironmentImage, Poles};
+use super::image::{Edges, EnvironmentImage, Poles};
 use super::{MAX_RADIANCE, MIN_RADIANCE};
 use crate::error::{Error, ErrorKind};
 use crate::parallel;
@@ -12,15 +12,6 @@ use crate::warp::equal_area::wrap_texel;
 ///
 /// Larger: the products would still fit, but counts of texels would need 64 bits everywhere.
 const MAX_IMAGE_SIDE: usize = 1 << 16;
-
-/// How the image continues beyond its edges.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Edges {
-    /// A latitude-longitude image: columns repeat, rows continue beyond the poles as the host says.
-    LatLong(Poles),
-    /// An equal-area image: the octahedral map's copies, rotated by half a turn.
-    EqualArea,
-}
 
 /// A checked image, borrowed from the host, and the grid of cells of constant radiance that stands for it.
 #[derive(Clone, Copy, Debug)]

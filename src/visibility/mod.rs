@@ -18,8 +18,8 @@ mod validate;
 
 pub(crate) use counts::{Counts, LeafKey};
 pub(crate) use distill::distill;
-pub(crate) use regions::{RegionBuilder, orientation};
-pub(crate) use table::{RegionFactors, VisibilityHeader};
+pub(crate) use regions::RegionBuilder;
+pub(crate) use table::{RegionFactors, VisibilityHeader, orientation};
 pub use table::{Visibility, VisibilityView};
 
 /// Bit that tells the factors for bright features of the environment from those for everything else. *Format*: nodes

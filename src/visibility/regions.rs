@@ -12,23 +12,6 @@ use glam::Vec3;
 
 use super::table::{NOTHING, ORIENTATIONS, REGION, RegionNode, find};
 use crate::math;
-use crate::receiver::{Receiver, ReceiverKind};
-
-/// Returns the root that a receiver belongs to: that of the axis which is nearest to its normal, or the last one for a
-/// receiver without a side.
-#[inline]
-pub(crate) fn orientation(receiver: &Receiver) -> usize {
-    if !receiver.has_horizon() {
-        return ORIENTATIONS - 1;
-    }
-    let normal = receiver.normal().to_array();
-    let size = normal.map(f32::abs);
-    let mut axis = usize::from(size[1] > size[0]);
-    if size[2] > size[axis] {
-        axis = 2;
-    }
-    2 * axis + usize::from(normal[axis] < 0.0)
-}
 
 /// Where the reports of a region are.
 #[derive(Clone, Copy, Debug, PartialEq)]

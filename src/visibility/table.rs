@@ -6,10 +6,9 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::regions::orientation;
 use crate::buffers::{Section, Sections, buffers, write};
 use crate::error::Error;
-use crate::receiver::ShadingPoint;
+use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::tlas::{FactorBytes, factor};
 
 /// Factors of a node's lanes, each a byte `b` that stands for ((b + 1) / 256)² ([`factor`]): from 1.5e-5 to 1, finest
@@ -223,6 +222,22 @@ impl<'a> VisibilityView<'a> {
         let range = start as usize..end as usize;
         Some(RegionFactors { keys: self.keys.get(range.clone())?, factors: self.factors.get(range)? })
     }
+}
+
+/// Returns the root that a receiver belongs to: that of the axis which is nearest to its normal, or the last one for a
+/// receiver without a side.
+#[inline]
+pub(crate) fn orientation(receiver: &Receiver) -> usize {
+    if !receiver.has_horizon() {
+        return ORIENTATIONS - 1;
+    }
+    let normal = receiver.normal().to_array();
+    let size = normal.map(f32::abs);
+    let mut axis = usize::from(size[1] > size[0]);
+    if size[2] > size[axis] {
+        axis = 2;
+    }
+    2 * axis + usize::from(normal[axis] < 0.0)
 }
 
 /// Returns the region that a position is in.

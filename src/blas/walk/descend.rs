@@ -3,7 +3,7 @@
 //!
 //! All of it is inlined, so that a caller can have a whole descent compiled for wider vectors.
 
-use super::guide::Guide;
+use super::guide::{GroupSums, Guide};
 use super::target::CellTarget;
 use crate::blas::barycentric::{ARITY, EDGE_CELLS, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
 use crate::blas::node::{self, CellNode, LEAF, Root};
@@ -12,9 +12,6 @@ use crate::warp::{keep_positive, sum_wide, within_range};
 
 /// The smallest cell that can be divided, in lattice units.
 const SMALLEST_DIVISIBLE: u32 = LATTICE >> (MAX_HALVINGS - LEVEL_HALVINGS);
-
-/// Sum of the weights of each group, which is [`EDGE_CELLS`] cells of successive ranks.
-pub(crate) type GroupSums = [f32; EDGE_CELLS as usize];
 
 /// Descends from the whole triangle to a cell over which the density is constant. Returns it with its probability;
 /// `None` where nothing can arrive from the cell that the guide leads to.

@@ -1,8 +1,10 @@
 //! What leads a descent from a cell to one of its children: random numbers, or a point that is given.
 
-use super::descend::GroupSums;
 use crate::blas::barycentric::{self, ARITY, EDGE_CELLS, LATTICE, LEVEL_HALVINGS, Lattice, LatticeCell};
 use crate::warp::{Variate, pick_wide};
+
+/// Sum of the weights of each group, which is [`EDGE_CELLS`] cells of successive ranks.
+pub(crate) type GroupSums = [f32; EDGE_CELLS as usize];
 
 /// What leads a descent from a cell to one of its children.
 pub(crate) trait Guide {

@@ -82,7 +82,7 @@ impl Opening {
                 Coverage::Part => {
                     if environment.is_feature_leaf(at) {
                         for texel in environment.feature_texels(at) {
-                            let cut = TexelCut::new(texel, self);
+                            let cut = TexelCut::new(texel, &self.planes);
                             if visit(Piece::Texel(texel, cut), texel.power() * cut.share()) {
                                 return;
                             }

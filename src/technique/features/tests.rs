@@ -93,7 +93,7 @@ fn nothing_that_is_seen_is_left_out() {
             let (block, _) = view.feature_at(direction).expect("a block of the sun");
             let texel = &view.feature_texels(0)[block as usize];
             let place = (point * (1_u32 << texel.level) as f32).fract() - 0.5;
-            match TexelCut::new(texel, &opening) {
+            match TexelCut::new(texel, &opening.planes) {
                 TexelCut::Nothing => panic!("{direction} is seen"),
                 TexelCut::All => {}
                 TexelCut::Part(polygon, _) => assert!(polygon.holds(place.to_array(), 1e-3), "{polygon:?} {place}"),

@@ -8,7 +8,6 @@
 use glam::Vec3;
 
 use super::clipped_square::ClippedSquare;
-use super::opening::Opening;
 use crate::env::FeatureTexel;
 
 /// The part of a texel that is visible through an opening.
@@ -23,11 +22,11 @@ pub(super) enum TexelCut {
 }
 
 impl TexelCut {
-    /// Cuts a texel by the planes of an opening.
+    /// Cuts a texel by the planes of an opening, in the environment's frame.
     #[inline]
-    pub(super) fn new(texel: &FeatureTexel, opening: &Opening) -> Self {
+    pub(super) fn new(texel: &FeatureTexel, planes: &[Vec3; 3]) -> Self {
         let center = Vec3::from_array(texel.center);
-        let depths = opening.planes.map(|plane| plane.dot(center));
+        let depths = planes.map(|plane| plane.dot(center));
         let [a, b, c] = depths;
         let least = a.min(b).min(c);
         // Most texels are decided by their distances from the planes.
@@ -37,14 +36,14 @@ impl TexelCut {
         if least >= texel.radius {
             return Self::All;
         }
-        Self::exact(texel, opening, depths)
+        Self::exact(texel, planes, depths)
     }
 
     /// Cuts a texel whose center has the given distances from the planes.
-    fn exact(texel: &FeatureTexel, opening: &Opening, depths: [f32; 3]) -> Self {
+    fn exact(texel: &FeatureTexel, planes: &[Vec3; 3], depths: [f32; 3]) -> Self {
         let [s, t] = texel.sides.map(Vec3::from_array);
         let mut part = None;
-        for (plane, depth) in opening.planes.into_iter().zip(depths) {
+        for (plane, depth) in planes.iter().zip(depths) {
             let line = [depth + texel.margin, plane.dot(s), plane.dot(t)];
             let reach = 0.5 * (line[1].abs() + line[2].abs());
             if line[0] < -reach {

@@ -14,7 +14,7 @@
 
 use glam::Vec3;
 
-use super::learned::FactorBytes;
+use super::factors::FactorBytes;
 use crate::math::{self, at_least, at_most, only_if};
 use crate::receiver::{LEAST_CLUSTER_COSINE, Lobe, ReceiverLanes, ShadingPoint};
 use crate::tlas::node::{ALL, Child, LANE_TWO_SIDED, MEAN_STEPS, NORMAL_STEPS, Node, TANGENT_STEPS, WIDE, wide};
@@ -49,7 +49,7 @@ pub(crate) trait LeafOracle {
     fn has_factors(&self) -> bool;
 
     /// Returns what is known of the children of a node, as bytes that stand for factors
-    /// ([`factor`](super::learned::factor)).
+    /// ([`factor`](super::factors::factor)).
     fn factors(&self, node: u32) -> Option<&FactorBytes>;
 }
 

@@ -4,25 +4,13 @@
 //! They come after everything else that decides about a weight, and only where the oracle has any. No factor is zero,
 //! so what is possible stays possible.
 
+use super::factors::{FACTORS, factor};
 use super::importance::{Estimates, LeafOracle};
 use crate::math::only_if;
 use crate::tlas::arity::Arity;
 use crate::tlas::node::Node;
 use crate::tlas::tree::{TlasView, WideTree, for_arity};
 use crate::warp::within_range;
-
-/// Number of factors of a node: lanes of the widest tree. *Format*.
-pub(crate) const FACTORS: usize = 16;
-
-/// Bytes that stand for factors.
-pub(crate) type FactorBytes = [u8; FACTORS];
-
-/// Returns the factor in `(0, 1]` that a byte stands for: finest near zero, and never zero.
-#[inline(always)]
-pub(crate) fn factor(byte: u8) -> f32 {
-    let root = (f32::from(byte) + 1.0) * (1.0 / 256.0);
-    root * root
-}
 
 impl<const N: usize> Node<N> {
     /// Multiplies the weights by what is known of this node. Opened children are left to [`WideTree::inherited`].

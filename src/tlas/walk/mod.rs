@@ -5,6 +5,7 @@
 
 mod beam;
 pub(in crate::tlas) mod descend;
+mod factors;
 mod groups;
 mod importance;
 mod kept;
@@ -19,8 +20,8 @@ use glam::Vec3;
 
 pub(crate) use beam::{Beam, Outgoing};
 pub(crate) use descend::{Descent, FirstWeights, INTERLEAVED};
+pub(crate) use factors::{FACTORS, FactorBytes, factor};
 pub(crate) use importance::LeafOracle;
-pub(crate) use learned::{FACTORS, FactorBytes, factor};
 pub(crate) use segment::{ClusterAlong, ClusterMoments, Clusters, Stretch};
 pub use split::Splitting;
 
