@@ -7,6 +7,11 @@ use glam::{Vec3, Vec4};
 use crate::geometry::{Aabb, Cone};
 use crate::math;
 
+/// Returns an energy in single precision, zero only if it is zero.
+pub(crate) fn storable(energy: f64) -> f32 {
+    if energy > 0.0 { energy.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32 } else { 0.0 }
+}
+
 /// Where the lights of a cluster are, which way they face and how much they send.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightBounds {

@@ -4,13 +4,15 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::distant::{self, DistantRecord};
+use super::distant;
+use super::distant_record::DistantRecord;
 use super::extras;
 use super::instance::{self, AddedObject, InstanceRecord, PlacedObject};
 use super::mesh::{Mesh, MeshKind, Sides, Weight, check_end, check_triangles};
 use super::meshes::mesh_of;
 use super::motion::{EndVertices, MotionCollection, end_vertices};
-use super::profile::{Profile, ProfileCollection};
+use super::profile::Profile;
+use super::profile_values::ProfileCollection;
 use super::projection::Projection;
 use super::{
     Energies, Extras, Illumination, Lamp, LampLight, LampRecord, Light, LightKind, LightTriangle, Lights, NO_AREA,
@@ -158,7 +160,7 @@ impl<'a> LightCollection<'a> {
             return Err(Error(ErrorKind::TooMany { what: "lights", count: number + 1, limit: MAX_LEAVES }));
         }
         let record = lamp.record(number as u32)?;
-        self.profiles.view().check(&record)?;
+        self.profiles.view().check(record.number(), record.profile())?;
         self.lamps.push(record);
         self.lamp_groups.push(groups);
         Ok(LightId(number as u32))

@@ -7,9 +7,9 @@
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
+use super::distant_record::{DistantGroup, DistantRecord};
 use super::{DistantLight, Lamp, irradiance_of_cap};
 use crate::error::Error;
 use crate::math;
@@ -37,42 +37,6 @@ const DIRECTION_ROUNDING: f64 = 2e-7;
 /// Steps of the square of all directions in which lights are sorted, a side. Affects which lights share a group.
 /// *Chosen*.
 const SORTING_STEPS: f32 = 1024.0;
-
-/// A distant light that can send something.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub(crate) struct DistantRecord {
-    /// Unit vector in which light travels.
-    axis: [f32; 3],
-    /// On a surface that faces the light.
-    irradiance: f32,
-    /// Angular radius; zero without an extent.
-    radius: f32,
-    /// Number among all lights that are not made of triangles.
-    number: u32,
-    /// Light groups.
-    pub(crate) groups: u32,
-}
-
-const _: () = assert!(size_of::<DistantRecord>() == 28);
-
-/// Neighbors in direction.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub(crate) struct DistantGroup {
-    /// Unit vector to the middle of the lights.
-    axis: [f32; 3],
-    /// Sine of the angle to the farthest direction of any of them; 2 for more than a right angle.
-    sin_reach: f32,
-    /// Sum of the irradiances.
-    irradiance: f32,
-    first: u32,
-    count: u32,
-    /// Light groups that any of the lights is in.
-    pub(crate) groups: u32,
-}
-
-const _: () = assert!(size_of::<DistantGroup>() == 32);
 
 /// A distant light as seen from a shading point.
 #[derive(Clone, Copy, Debug)]

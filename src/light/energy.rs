@@ -23,11 +23,6 @@ pub(crate) struct Energies<'a> {
     meshes: &'a [u32],
 }
 
-/// Returns an energy in single precision, zero only if it is zero.
-pub(crate) fn storable(energy: f64) -> f32 {
-    if energy > 0.0 { energy.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32 } else { 0.0 }
-}
-
 impl<'a> Energies<'a> {
     pub(crate) fn new(environment: &Environment, factors: &'a [f32], meshes: &'a [u32]) -> Self {
         let mean = f64::from(environment.mean_without_features());

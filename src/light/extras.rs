@@ -8,9 +8,10 @@ use alloc::vec::Vec;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::distant::{DistantGroup, DistantRecord};
-use super::motion::Motion;
-use super::profile::Profiles;
+use super::Lights;
+use super::distant_record::{DistantGroup, DistantRecord};
+use super::motion::{Motion, MotionCollection};
+use super::profiles::Profiles;
 use crate::error::Error;
 use crate::receiver::ALL_GROUPS;
 
@@ -77,7 +78,7 @@ pub(super) fn pack(
 }
 
 /// Replaces what moves by something else.
-pub(super) fn replace_motion(extras: &mut Vec<u32>, motion: &[u32]) {
+fn replace_motion(extras: &mut Vec<u32>, motion: &[u32]) {
     if extras.is_empty() {
         *extras = pack(&[], &[], &[], [&[]; 2], motion);
         return;
@@ -91,6 +92,15 @@ pub(super) fn replace_motion(extras: &mut Vec<u32>, motion: &[u32]) {
     extras.extend_from_slice(motion);
     if extras.iter().all(|word| *word == 0) {
         extras.clear();
+    }
+}
+
+impl Lights {
+    /// Changes what moves.
+    pub(super) fn update_motion(&mut self, change: impl FnOnce(&mut MotionCollection)) {
+        let mut motion = MotionCollection::of(self.view().extras().motion());
+        change(&mut motion);
+        replace_motion(&mut self.extras, &motion.pack());
     }
 }
 
@@ -179,8 +189,12 @@ impl<'a> Extras<'a> {
     }
 
     /// Checks that the arrays are where the header says, and what they hold. `leaves` is the number of lights in the
-    /// tree.
-    pub(super) fn validate(self, leaves: usize) -> Result<(), Error> {
+    /// tree, `check_distants` what checks distant lights and their groups.
+    pub(super) fn validate(
+        self,
+        leaves: usize,
+        check_distants: impl FnOnce(&[DistantRecord], &[DistantGroup]) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         if self.is_empty() {
             return Ok(());
         }
@@ -200,7 +214,7 @@ impl<'a> Extras<'a> {
         if groups > 0 {
             Error::unless_equal("number of light groups", groups as usize, leaves + 1)?;
         }
-        super::distant::validate(self.distants(), self.distant_groups())?;
+        check_distants(self.distants(), self.distant_groups())?;
         self.motion().validate()?;
         self.profiles().validate()
     }

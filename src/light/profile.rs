@@ -4,12 +4,10 @@
 //! vertical angles it is zero. What is kept of a profile is the table, the mean intensity, the vertical angle beyond
 //! which nothing is sent, and sums over the cells of the table by which rays of light are drawn.
 
-use alloc::vec::Vec;
 use core::f32::consts::{PI, TAU};
 use core::f64::consts::{PI as PI64, TAU as TAU64};
 
-use super::lamp::LampRecord;
-use super::projection::ProjectionTable;
+use super::profile_values::{HEADER, ProfileCollection, REACH_MARGIN, push_sums};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
 use crate::math;
@@ -17,21 +15,6 @@ use crate::record::ProfileId;
 
 /// Most angles of a profile, vertical or horizontal. *Format*: numbers of cells are exact in single precision.
 const MOST_ANGLES: usize = 2048;
-
-/// Values in front of a table: numbers of vertical and horizontal angles, mean intensity, and largest vertical angle at
-/// which anything is sent. *Format.*
-pub(super) const HEADER: usize = 4;
-
-/// Widening of the largest vertical angle, in radians. *Proved*: covers the rounding of angles to single precision,
-/// 2e-7. A larger one culls less.
-pub(super) const REACH_MARGIN: f32 = 1e-6;
-
-/// Least share of a cell among all cells of a profile, of a row of a projection among all rows, and of a texel in its
-/// row, if it is lit. *Proved*: above the rounding of sums up to 1 to single precision, 6e-8, also where shares of the
-/// most cells of a profile add up to 2, so that nothing that is lit is without a share.
-///
-/// Larger: more rays from what is dark.
-pub(super) const LEAST_SHARE: f64 = 2.4e-7;
 
 /// The intensity of a luminaire by direction, borrowed from the host: a goniometric diagram, as files of the format
 /// IESNA LM-63 hold it.
@@ -182,23 +165,7 @@ pub(super) fn angles_of_direction([x, y, z]: [f64; 3]) -> [f64; 2] {
     [math::atan2_64(math::sqrt64(x * x + y * y), z), math::atan2_64(y, x)]
 }
 
-/// All profiles of a scene on their way into a sampler.
-#[derive(Debug, Default)]
-pub(super) struct ProfileCollection {
-    pub(super) starts: Vec<u32>,
-    pub(super) values: Vec<f32>,
-}
-
 impl ProfileCollection {
-    pub(super) fn view(&self) -> Profiles<'_> {
-        Profiles { starts: &self.starts, values: &self.values }
-    }
-
-    /// Returns starts and values, as words.
-    pub(super) fn arrays(&self) -> [&[u32]; 2] {
-        [&self.starts, bytemuck::cast_slice(&self.values)]
-    }
-
     /// Adds a profile, unless there is something wrong with it.
     pub(super) fn add(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
         profile.check()?;
@@ -224,68 +191,6 @@ impl ProfileCollection {
     }
 }
 
-/// Appends the shares of these powers, added up; of what is lit, none is so small that it vanishes.
-pub(super) fn push_sums(values: &mut Vec<f32>, powers: impl Iterator<Item = f64> + Clone) {
-    let total: f64 = powers.clone().sum();
-    let share = |power: f64| if power > 0.0 { (power / total).max(LEAST_SHARE) } else { 0.0 };
-    let all: f64 = powers.clone().map(share).sum();
-    let mut sum = 0.0;
-    for power in powers {
-        sum += share(power);
-        values.push(if all > 0.0 { (sum / all).min(1.0) as f32 } else { 0.0 });
-    }
-}
-
-/// All profiles of a sampler.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Profiles<'a> {
-    /// Where each starts in `values`, and the end. Empty without profiles.
-    pub(super) starts: &'a [u32],
-    pub(super) values: &'a [f32],
-}
-
-/// Intensities by direction, from a profile or from a projection.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Distribution<'a> {
-    /// Mean intensity over all directions.
-    pub(super) mean: f32,
-    /// Largest angle from the axis at which anything is sent.
-    pub(super) reach: f32,
-    by: Table<'a>,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Table<'a> {
-    Angles(ProfileTable<'a>),
-    Image(ProjectionTable<'a>),
-}
-
-impl Distribution<'_> {
-    /// Returns the intensity in a direction in the frame of the light.
-    pub(super) fn intensity(&self, direction: [f64; 3]) -> f32 {
-        match &self.by {
-            Table::Angles(table) => table.profile.intensity(angles_of_direction(direction)),
-            Table::Image(table) => table.intensity(direction),
-        }
-    }
-
-    /// Draws a unit direction in the frame of the light.
-    pub(super) fn sample(&self, u: [f64; 2]) -> [f64; 3] {
-        match &self.by {
-            Table::Angles(table) => direction_of_angles(table.sample(u)),
-            Table::Image(table) => table.sample(u),
-        }
-    }
-
-    /// Returns the density per solid angle with which [`Self::sample`] draws a direction.
-    pub(super) fn pdf(&self, direction: [f64; 3]) -> f64 {
-        match &self.by {
-            Table::Angles(table) => table.pdf(angles_of_direction(direction)),
-            Table::Image(table) => table.pdf(direction),
-        }
-    }
-}
-
 /// A profile as a sampler keeps it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ProfileTable<'a> {
@@ -294,63 +199,9 @@ pub(super) struct ProfileTable<'a> {
     sums: &'a [f32],
 }
 
-impl<'a> Profiles<'a> {
-    /// Number of profiles.
-    pub(super) fn count(&self) -> usize {
-        self.starts.len().saturating_sub(1)
-    }
-
-    /// Returns a profile or a projection by its number, if its values are as many as they should be. The number of rows
-    /// of a projection is negative.
-    pub(super) fn get(&self, profile: u32) -> Option<Distribution<'a>> {
-        let starts = self.starts.get(profile as usize..)?;
-        let [start, end, ..] = starts else { return None };
-        let (header, values) = self.values.get(*start as usize..*end as usize)?.split_first_chunk::<HEADER>()?;
-        let by = if header[0] < 0.0 {
-            Table::Image(ProjectionTable::new(*header, values)?)
-        } else {
-            Table::Angles(ProfileTable::new(*header, values)?)
-        };
-        let [_, _, mean, reach] = *header;
-        Some(Distribution { mean, reach, by })
-    }
-
-    /// Checks that the profile of a lamp exists.
-    pub(super) fn check(&self, lamp: &LampRecord) -> Result<(), Error> {
-        match lamp.profile() {
-            Some(profile) if profile as usize >= self.count() => {
-                let (light, profile) = (lamp.number() as usize, profile as usize);
-                Err(Error(ErrorKind::UnknownProfile { light, profile, profiles: self.count() }))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Checks profiles that come from outside.
-    pub(super) fn validate(&self) -> Result<(), Error> {
-        let end = self.starts.last().map_or(0, |&end| end as usize);
-        Error::unless_equal("number of values of profiles", end, self.values.len())?;
-        Error::unless_equal("start of the first profile", self.starts.first().map_or(0, |&start| start as usize), 0)?;
-        Error::unless_equal("number of starts of profiles", usize::from(self.starts.len() == 1), 0)?;
-        for number in 0..self.count() {
-            let fail = || Error::bytes("profile", number, 0, 0);
-            let Distribution { mean, reach, by } = self.get(number as u32).ok_or_else(fail)?;
-            let is_sound = (0.0..=blas::MAX_AVERAGE).contains(&mean) && (0.0..=PI).contains(&reach);
-            let is_valid = match by {
-                Table::Angles(table) => table.is_valid(),
-                Table::Image(table) => table.is_valid(),
-            };
-            if !(is_sound && is_valid) {
-                return Err(fail());
-            }
-        }
-        Ok(())
-    }
-}
-
 impl<'a> ProfileTable<'a> {
     /// Returns the table of these values after a header, if there are as many as there should be.
-    fn new([rows, columns, ..]: [f32; HEADER], values: &'a [f32]) -> Option<Self> {
+    pub(super) fn new([rows, columns, ..]: [f32; HEADER], values: &'a [f32]) -> Option<Self> {
         let [rows, columns] = [rows as usize, columns as usize];
         let cells = rows.checked_sub(1)?.checked_mul(columns)?;
         let (vertical, values) = values.split_at_checked(rows)?;
@@ -360,7 +211,7 @@ impl<'a> ProfileTable<'a> {
     }
 
     /// Whether the values, which may come from outside, are those of a profile.
-    fn is_valid(&self) -> bool {
+    pub(super) fn is_valid(&self) -> bool {
         let ascends = self.sums.windows(2).all(|pair| pair[0] <= pair[1]);
         self.profile.check().is_ok() && ascends && self.sums.iter().all(|sum| (0.0..=1.0).contains(sum))
     }
@@ -371,8 +222,18 @@ impl<'a> ProfileTable<'a> {
         f64::from(self.sums[cell]) - f64::from(before)
     }
 
+    /// Returns the intensity in a direction in the frame of the light.
+    pub(super) fn intensity(&self, direction: [f64; 3]) -> f32 {
+        self.profile.intensity(angles_of_direction(direction))
+    }
+
+    /// Draws a unit direction in the frame of the light.
+    pub(super) fn sample(&self, u: [f64; 2]) -> [f64; 3] {
+        direction_of_angles(self.angles(u))
+    }
+
     /// Draws a vertical and a horizontal angle: a cell by its power, and uniformly in its solid angle.
-    fn sample(&self, [u1, u2]: [f64; 2]) -> [f64; 2] {
+    fn angles(&self, [u1, u2]: [f64; 2]) -> [f64; 2] {
         let Some(last) = self.sums.len().checked_sub(1) else { return [0.0; 2] };
         let total = f64::from(self.sums[last]);
         // The first cell whose end is beyond: never one without power.
@@ -388,8 +249,9 @@ impl<'a> ProfileTable<'a> {
         [math::atan2_64(sin, cos), f64::from(horizontal[column]) + u2 * width_of(horizontal, column)]
     }
 
-    /// Returns the density per solid angle with which [`Self::sample`] draws a vertical and a horizontal angle.
-    fn pdf(&self, [vertical, horizontal]: [f64; 2]) -> f64 {
+    /// Returns the density per solid angle with which [`Self::sample`] draws a direction.
+    pub(super) fn pdf(&self, direction: [f64; 3]) -> f64 {
+        let [vertical, horizontal] = angles_of_direction(direction);
         let Some((row, _)) = row_at(self.profile.vertical, vertical) else { return 0.0 };
         let ([column, _], _) = columns_at(self.profile.horizontal, horizontal);
         let total = self.sums.last().map_or(0.0, |&total| f64::from(total));

@@ -8,7 +8,7 @@
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use super::profile::{HEADER, ProfileCollection, REACH_MARGIN, push_sums};
+use super::profile_values::{HEADER, ProfileCollection, REACH_MARGIN, push_sums};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
 use crate::math;

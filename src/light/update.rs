@@ -4,7 +4,8 @@ use alloc::vec::Vec;
 
 use glam::Vec3;
 
-use super::distant::{self, DistantRecord};
+use super::distant;
+use super::distant_record::DistantRecord;
 use super::extras;
 use super::mesh::{MeshUpdate, check_end, check_triangles};
 use super::motion::{end_vertices, has_area_between};
@@ -32,7 +33,7 @@ impl Lights {
             let &leaf =
                 self.leaf_of[first..].get(light).ok_or(Error(ErrorKind::UnknownLight { light, lights: count }))?;
             let record = lamp.record(light as u32)?;
-            self.view().extras().profiles().check(&record)?;
+            self.view().extras().profiles().check(record.number(), record.profile())?;
             let is_distant = self.view().extras().distant_of(LightId(light as u32)).is_some();
             match self.records.get(leaf as usize) {
                 _ if is_distant != matches!(lamp, Lamp::Distant(_)) && (is_distant || leaf < NO_AREA) => {

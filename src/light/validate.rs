@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::{Extras, Light, LightsView, NO_AREA};
+use super::{Extras, Light, LightsView, NO_AREA, distant};
 use crate::blas;
 use crate::error::Error;
 
@@ -23,7 +23,7 @@ impl LightsView<'_> {
         Error::unless_equal("mark of lamps", self.has_lamps.into(), (lamps > 0).into())?;
         blas::validate_roots(&roots, self.cells)?;
         self.validate_leaves()?;
-        self.extras().validate(self.len())?;
+        self.extras().validate(self.len(), distant::validate)?;
         let count = self.extras().profiles().count();
         let lamps =
             self.records.iter().filter_map(|record| match Light::of(record, Extras::NONE, self.instances, 0.0) {

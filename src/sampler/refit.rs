@@ -1,8 +1,9 @@
 //! Lights that move or change their brightness, in a tree whose shape stays.
 
 use super::lights::LightSampler;
+use crate::bounds::storable;
 use crate::error::Error;
-use crate::light::{Energies, Instance, Lamp, MeshUpdate, storable};
+use crate::light::{Energies, Instance, Lamp, MeshUpdate};
 use crate::record::{InstanceId, LightId};
 
 impl LightSampler {

@@ -3,16 +3,17 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use super::changes::{InstanceChange, LampChange, MeshChange, check_scale, class_of, places_of};
+use super::changes::{Changes, InstanceChange, LampChange, MeshChange, check_scale, class_of, places_of};
 use super::{EditState, LightChanges, LightStore, LightsState, StoredLight, UNIT_DRIFT, append_cells, motion};
 use crate::blas::LEAF;
+use crate::bounds::storable;
 use crate::env::Environment;
 use crate::error::{Error, ErrorKind};
-use crate::light::distant::{self, DistantRecord};
+use crate::light::distant;
+use crate::light::distant_record::DistantRecord;
 use crate::light::instance::{InstanceRecord, PlacedObject, RECORD_WORDS, emits, first_object, records, records_mut};
 use crate::light::{
     Energies, Light, LightCollection, LightKind, LightTriangle, Lights, MovingTriangle, NO_AREA, NO_LEAF, extras,
-    storable,
 };
 use crate::progress::Progress;
 use crate::receiver::ALL_GROUPS;
@@ -436,7 +437,3 @@ impl LightsState {
         sum
     }
 }
-
-/// What becomes of lamps, meshes and instances.
-pub(super) type Changes<'c> =
-    (&'c BTreeMap<u32, Option<LampChange>>, &'c BTreeMap<u32, MeshChange>, &'c BTreeMap<u32, Option<InstanceChange>>);

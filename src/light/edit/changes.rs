@@ -71,6 +71,10 @@ pub(super) struct InstanceChange {
     pub(super) groups: Option<u32>,
 }
 
+/// What becomes of lamps, meshes and instances.
+pub(super) type Changes<'c> =
+    (&'c BTreeMap<u32, Option<LampChange>>, &'c BTreeMap<u32, MeshChange>, &'c BTreeMap<u32, Option<InstanceChange>>);
+
 /// Returns the logarithm of the places of a mesh, by which a removed one is found; rounded up for one that looks for
 /// places.
 pub(super) fn class_of(places: u32) -> u32 {
@@ -137,7 +141,7 @@ impl<'a> LightChanges<'a> {
     fn lamp(&self, lights: &Lights, lamp: Lamp, number: u32) -> Result<LampRecord, Error> {
         check_count("lights", number as usize + 1)?;
         let record = lamp.record(number)?;
-        lights.view().extras().profiles().check(&record)?;
+        lights.view().extras().profiles().check(record.number(), record.profile())?;
         Ok(record)
     }
 

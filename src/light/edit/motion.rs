@@ -3,8 +3,7 @@
 
 use alloc::vec::Vec;
 
-use super::apply::Changes;
-use super::changes::MeshChange;
+use super::changes::{Changes, MeshChange};
 use crate::light::motion::{EndColumns, EndVertices};
 use crate::light::{LightCollection, Lights};
 

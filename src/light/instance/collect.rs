@@ -1,75 +1,16 @@
-//! Objects and instances on their way into a sampler.
+//! Objects and instances that are added to the collection of all lights.
 
-use alloc::vec;
 use alloc::vec::Vec;
 
-use glam::Vec3;
-
-use super::object::{Object, ObjectParts};
+use super::added::AddedObject;
 use super::{Instance, InstanceRecord, first_object};
 use crate::error::{Error, ErrorKind};
 use crate::geometry::Aabb;
-use crate::light::{Energies, Light, LightCollection, LightTriangle, Mesh, NO_LEAF};
-use crate::parallel;
+use crate::light::{Energies, LightCollection, LightTriangle, Mesh};
 use crate::progress::Progress;
 use crate::receiver::ALL_GROUPS;
 use crate::record::{InstanceId, MeshId, ObjectId};
-use crate::tlas::{self, Arity, MAX_LEAVES};
-
-/// The meshes of an object before there is a tree over them: what the collection keeps of meshes that stand alone.
-pub(in crate::light) struct AddedObject {
-    pub(in crate::light) triangles: Vec<LightTriangle>,
-    pub(in crate::light) indices: Vec<u32>,
-    pub(in crate::light) meshes: Vec<u32>,
-    /// Triangles that wait for trees over images.
-    pub(in crate::light) pending: Vec<(u32, u32)>,
-    /// Corners of the box around all vertices.
-    corners: [Vec3; 2],
-}
-
-impl AddedObject {
-    fn empty() -> Self {
-        Self {
-            triangles: Vec::new(),
-            indices: Vec::new(),
-            meshes: vec![0],
-            pending: Vec::new(),
-            corners: [Vec3::ZERO; 2],
-        }
-    }
-
-    /// Appends the words of the object, if there is a number for each of them. Returns its first word.
-    fn build(
-        &self,
-        arity: Arity,
-        energies: &Energies<'_>,
-        progress: &Progress<'_>,
-        words: &mut Vec<u32>,
-    ) -> Result<u32, Error> {
-        let emits = |index: &u32| energies.energy(Light::Triangle(&self.triangles[*index as usize])) > 0.0;
-        let emitting: Vec<u32> = (0..self.triangles.len() as u32).filter(emits).collect();
-        let light = |i: usize| Light::Triangle(&self.triangles[emitting[i] as usize]);
-        let total = parallel::sum(emitting.len(), |i| energies.energy(light(i)));
-        let all = parallel::collect(emitting.len(), |i| energies.bounds(light(i), total));
-        let (mut tree, order) = tlas::build_in_groups(arity, emitting.len(), &|i| all[i as usize].0, &[], progress)?;
-        let bounds = parallel::collect(order.len(), |leaf| all[order[leaf] as usize]);
-        tree.fit(&|leaf| bounds[leaf as usize]);
-        let mut leaf_of_triangle = vec![NO_LEAF; self.triangles.len()];
-        for (leaf, &i) in (0..).zip(&order) {
-            leaf_of_triangle[emitting[i as usize] as usize] = leaf;
-        }
-        let leaf_of = |index: &u32| leaf_of_triangle.get(*index as usize).copied().unwrap_or(*index);
-        let leaf_of: Vec<u32> = self.indices.iter().map(leaf_of).collect();
-        let records: Vec<LightTriangle> =
-            order.iter().map(|&i| self.triangles[emitting[i as usize] as usize]).collect();
-        let parts =
-            ObjectParts { tree: &tree, records: &records, meshes: &self.meshes, leaf_of: &leaf_of, bounds: &bounds };
-        let start = words.len();
-        let too_many = || ErrorKind::TooMany { what: "words of objects", count: start, limit: u32::MAX as usize };
-        parts.append(words).ok_or_else(|| Error(too_many()))?;
-        Ok(start as u32)
-    }
-}
+use crate::tlas::{Arity, MAX_LEAVES};
 
 impl<'a> LightCollection<'a> {
     /// Exchanges what is kept of meshes for that of an object, so that meshes can be added to it.
@@ -166,9 +107,4 @@ impl LightTriangle {
         let mark = Self::LAMP | Self::PORTAL;
         (self.index_and_flags & (mark | Self::MOVING) == mark).then_some(self.index_and_flags & !mark)
     }
-}
-
-/// Returns whether an object can send anything under an environment of this mean radiance.
-pub(in crate::light) fn emits(object: &Object<'_>, mean: f64) -> bool {
-    f64::from(object.header.flux) + mean * f64::from(object.header.portal) > 0.0
 }

@@ -7,6 +7,7 @@
 //! world ([`PlacedTriangle`]), and from there on it is a triangle like any other: trees over textures do not know its
 //! shape.
 
+mod added;
 mod bounds;
 mod collect;
 mod cross;
@@ -24,16 +25,16 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Vec3};
 
 use super::motion::EndColumns;
-use super::{LightKind, LocalPoint, POSITION_LIMIT, storable};
+use super::{LightKind, LocalPoint, POSITION_LIMIT};
 use crate::blas;
-use crate::bounds::{LightBounds, Moments};
+use crate::bounds::{LightBounds, Moments, storable};
 use crate::error::{Error, ErrorKind};
 use crate::geometry::{Placement, norm};
 use crate::receiver::{ALL_GROUPS, ShadingPoint};
 use crate::record::ObjectId;
 
-pub(super) use collect::{AddedObject, emits};
-pub(super) use object::{Object, object_records_mut, object_starts};
+pub(super) use added::AddedObject;
+pub(super) use object::{Object, emits, object_records_mut, object_starts};
 pub(crate) use triangle::PlacedTriangle;
 pub(crate) use walk::ObjectWalk;
 

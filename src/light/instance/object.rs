@@ -8,9 +8,9 @@ use alloc::vec::Vec;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::bounds::{LightBounds, Moments};
+use crate::bounds::{LightBounds, Moments, storable};
 use crate::light::meshes::mesh_of;
-use crate::light::{LightKind, LightTriangle, NO_AREA, storable};
+use crate::light::{LightKind, LightTriangle, NO_AREA};
 use crate::math::sqrt64;
 use crate::record::{MeshId, TriangleId};
 use crate::tlas::{Arity, Tlas, TlasView};
@@ -303,4 +303,9 @@ pub(in crate::light) fn object_records_mut(words: &mut [u32], mut change: impl F
         records.iter_mut().for_each(&mut change);
         start = end;
     }
+}
+
+/// Returns whether an object can send anything under an environment of this mean radiance.
+pub(in crate::light) fn emits(object: &Object<'_>, mean: f64) -> bool {
+    f64::from(object.header.flux) + mean * f64::from(object.header.portal) > 0.0
 }

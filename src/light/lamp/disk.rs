@@ -11,7 +11,7 @@ use super::{
 use crate::geometry::{Aabb, Cone};
 use crate::light::Sides;
 use crate::light::emitted::{EmittedRay, cosine_ray, per_direction};
-use crate::light::profile::Profiles;
+use crate::light::profiles::Profiles;
 use crate::math;
 use crate::receiver::{Receiver, ShadingPoint};
 use crate::warp::Variate;

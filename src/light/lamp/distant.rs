@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use super::{LampFault, LampKind, Reach, ShapeView, VALUES, check_axis, check_weight, within};
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
-use crate::light::profile::Profiles;
+use crate::light::profiles::Profiles;
 use crate::math;
 use crate::receiver::ShadingPoint;
 use crate::warp::Variate;

@@ -19,7 +19,7 @@ use glam::{DVec3, Vec3};
 
 use super::emitted::EmittedRay;
 use super::extras::Extras;
-use super::profile::Profiles;
+use super::profiles::Profiles;
 use super::triangle_view::FARTHEST_POINT;
 use super::{DrawnPoint, LightKind, LightTriangle, LightViewKind, LocalPoint, POSITION_LIMIT};
 use crate::blas;

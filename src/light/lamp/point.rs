@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::{LampFault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_position, check_weight};
 use crate::geometry::{Aabb, Cone};
 use crate::light::emitted::EmittedRay;
-use crate::light::profile::Profiles;
+use crate::light::profiles::Profiles;
 use crate::math;
 use crate::receiver::{Receiver, ReceiverKind, ShadingPoint};
 use crate::warp::Variate;

@@ -16,7 +16,7 @@ use super::{
 use crate::geometry::{Aabb, Cone};
 use crate::light::POSITION_LIMIT;
 use crate::light::emitted::{EmittedRay, cosine_ray, per_direction};
-use crate::light::profile::Profiles;
+use crate::light::profiles::Profiles;
 use crate::math;
 use crate::receiver::{Receiver, ShadingPoint};
 use crate::warp::Variate;

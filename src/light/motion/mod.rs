@@ -17,7 +17,7 @@ use alloc::vec::Vec;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{Lights, POSITION_LIMIT, extras};
+use super::POSITION_LIMIT;
 use crate::error::Error;
 
 pub(crate) use triangle::MovingTriangle;
@@ -233,14 +233,5 @@ impl MotionCollection {
             bytemuck::cast_slice(&columns),
         ];
         arrays.concat()
-    }
-}
-
-impl Lights {
-    /// Changes what moves.
-    pub(super) fn update_motion(&mut self, change: impl FnOnce(&mut MotionCollection)) {
-        let mut motion = MotionCollection::of(self.view().extras().motion());
-        change(&mut motion);
-        extras::replace_motion(&mut self.extras, &motion.pack());
     }
 }

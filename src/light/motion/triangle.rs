@@ -8,9 +8,9 @@ use glam::{DVec3, Vec3};
 
 use super::{EndVertices, Motion};
 use crate::blas::Lattice;
-use crate::bounds::{LightBounds, Moments};
+use crate::bounds::{LightBounds, Moments, storable};
 use crate::geometry::{self, Aabb, Cone, area_vectors, between};
-use crate::light::{LightKind, LightTriangle, LocalPoint, storable};
+use crate::light::{LightKind, LightTriangle, LocalPoint};
 use crate::math;
 use crate::receiver::{ReceiverKind, ShadingPoint};
 
