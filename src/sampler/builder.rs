@@ -51,6 +51,13 @@ pub struct LightSamplerBuilder<'a> {
     collection: LightCollection<'a>,
 }
 
+impl LightSampler {
+    /// Returns a builder without lights, whose environment is white.
+    pub fn builder<'a>() -> LightSamplerBuilder<'a> {
+        LightSamplerBuilder::new()
+    }
+}
+
 impl fmt::Debug for LightSamplerBuilder<'_> {
     /// Shows how much has been added.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

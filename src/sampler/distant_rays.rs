@@ -4,7 +4,7 @@ use core::f64::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
 
-use super::emission::EmissionSample;
+use super::emission_sample::EmissionSample;
 use super::finite::to_positive;
 use crate::light::{DistantRecord, LightsView};
 use crate::math;

@@ -3,8 +3,6 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use super::builder::LightSamplerBuilder;
-use super::emission::Emission;
 use super::point::PointSampler;
 use crate::env::{Environment, EnvironmentView, RegionMoments};
 use crate::error::Error;
@@ -71,11 +69,6 @@ impl ByteSizes {
 }
 
 impl LightSampler {
-    /// Returns a builder without lights, whose environment is white.
-    pub fn builder<'a>() -> LightSamplerBuilder<'a> {
-        LightSamplerBuilder::new()
-    }
-
     /// Returns the same lights in borrowed form.
     #[inline]
     #[must_use]
@@ -103,11 +96,6 @@ impl LightSampler {
     /// Draws one sample for each shading point and its random numbers: see [`LightSamplerView::sample_many`].
     pub fn sample_many(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
         self.as_view().sample_many(queries, samples);
-    }
-
-    /// Prepares to draw rays of light that leave the lights: see [`LightSamplerView::emission`].
-    pub fn emission(&self) -> Emission<'_> {
-        self.as_view().emission()
     }
 
     /// Returns the environment, for its own sampling.

@@ -6,6 +6,7 @@ mod credit;
 mod distant_rays;
 mod edit;
 mod emission;
+mod emission_sample;
 mod finite;
 mod lights;
 mod many;
@@ -17,7 +18,8 @@ mod visibility;
 
 pub use builder::LightSamplerBuilder;
 pub use edit::LightEdits;
-pub use emission::{Emission, EmissionSample};
+pub use emission::Emission;
+pub use emission_sample::EmissionSample;
 pub use lights::{ByteSizes, LightSampler, LightSamplerView};
 pub use point::PointSampler;
 pub use resample::ResampledLight;
