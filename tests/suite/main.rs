@@ -13,6 +13,7 @@ mod common;
 mod agreement;
 mod build;
 mod chi_square;
+mod circles;
 mod distant;
 mod docs;
 mod double_check;
