@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 /// From this size on work is worth handing to another thread. *Chosen*; affects time alone.
 pub(crate) const WORTHWHILE: usize = 4096;
 /// Elements that are summed up in one go. *Chosen*; it fixes the order of sums, so that another value changes bits.
-pub(crate) const CHUNK: usize = 1 << 15;
+pub(crate) const SUM_CHUNK: usize = 1 << 15;
 
 /// Runs both, side by side if they handle many elements.
 #[cfg(feature = "rayon")]
@@ -32,17 +32,17 @@ pub(crate) fn reduce<T: Sync, R: Send>(
     part: impl Fn(&[T]) -> R + Sync + Send,
     merge: impl Fn(R, R) -> R,
 ) -> R {
-    let (first, rest) = elements.split_at(elements.len().min(CHUNK));
+    let (first, rest) = elements.split_at(elements.len().min(SUM_CHUNK));
     if rest.is_empty() {
         return part(first);
     }
     #[cfg(feature = "rayon")]
     let results: Vec<R> = {
         use rayon::prelude::*;
-        elements.par_chunks(CHUNK).map(part).collect()
+        elements.par_chunks(SUM_CHUNK).map(part).collect()
     };
     #[cfg(not(feature = "rayon"))]
-    let results: Vec<R> = elements.chunks(CHUNK).map(part).collect();
+    let results: Vec<R> = elements.chunks(SUM_CHUNK).map(part).collect();
     let mut results = results.into_iter();
     let first = results.next().expect("the slice is not empty");
     results.fold(first, merge)
@@ -50,8 +50,8 @@ pub(crate) fn reduce<T: Sync, R: Send>(
 
 /// Returns the sum of `element(0..count)`.
 pub(crate) fn sum(count: usize, element: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
-    let part = |chunk: usize| (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).map(&element).sum::<f64>();
-    let chunks = count.div_ceil(CHUNK);
+    let part = |chunk: usize| (chunk * SUM_CHUNK..((chunk + 1) * SUM_CHUNK).min(count)).map(&element).sum::<f64>();
+    let chunks = count.div_ceil(SUM_CHUNK);
     #[cfg(feature = "rayon")]
     let parts: Vec<f64> = {
         use rayon::prelude::*;

@@ -25,10 +25,10 @@ pub(crate) fn storable(value: f64) -> f32 {
 }
 
 /// Words of a node before its codes. *Format*.
-const HEADER_WORDS: usize = 3;
+const NODE_HEADER_WORDS: usize = 3;
 
 /// Words of a node.
-const NODE_WORDS: usize = HEADER_WORDS + ARITY / 4;
+const NODE_WORDS: usize = NODE_HEADER_WORDS + ARITY / 4;
 
 /// A node.
 ///
@@ -130,7 +130,7 @@ pub(crate) fn append(nodes: &mut Vec<CellNode>, averages: &[f32], divided: &[boo
         node.0[2] = next;
         for (cell, (average, divided)) in averages.iter().zip(divided).enumerate() {
             let code = encode(average / largest * LARGEST_VALUE);
-            bytemuck::bytes_of_mut(&mut node.0)[4 * HEADER_WORDS + cell] = code;
+            bytemuck::bytes_of_mut(&mut node.0)[4 * NODE_HEADER_WORDS + cell] = code;
             node.0[cell / 32] |= u32::from(*divided) << (cell % 32);
         }
         next += node.divided().count_ones();

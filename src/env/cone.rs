@@ -35,7 +35,7 @@ pub(super) const CONSTANT_RATIO: f32 = 0.6;
 /// the rotation and of the direction.
 ///
 /// Larger: coarser bounds of the smallest regions. Smaller: a lit texel could be missed.
-const CONE_ROUNDING: f32 = 1e-6;
+const CONE_BOX_ROUNDING: f32 = 1e-6;
 
 /// Factor on the side of the box when a level is chosen. *Proved*: where the box is as wide as a texel, rounding (1e-7
 /// relative) could make it touch three texels instead of two.
@@ -107,7 +107,7 @@ impl EnvironmentView<'_> {
     /// Returns the mean, minimum and maximum over texels that hold a cone around a point of the square.
     #[inline]
     fn radiance_bounds(&self, x: f32, y: f32, sin_radius: f32) -> RadianceBounds {
-        let half = STRETCH * asin_bound(sin_radius) + CONE_ROUNDING;
+        let half = STRETCH * asin_bound(sin_radius) + CONE_BOX_ROUNDING;
         let depth = self.depth_of_side(2.0 * half);
         if depth == 0 {
             let [min, max] = self.ranges[0];

@@ -50,7 +50,7 @@ const REACH_SLACK: f32 = 1.005;
 /// certainly below the horizon. Chosen, not swept.
 ///
 /// Larger: more samples in regions that the horizon has all but taken. Smaller: more noise from what is left of them.
-const LEAST_SHARE: f32 = 0.01;
+const LEAST_REGION_SHARE: f32 = 0.01;
 
 /// Least spread. Chosen, not swept: half a texel of the deepest level that is summed up.
 ///
@@ -125,7 +125,7 @@ impl RegionMoments {
         self.reach[region] = (REACH_SLACK * math::sin_cos(angle).0).min(1.0);
         // The filter reaches beyond the region, so that it is positive and not more than what the region may hold.
         let rest = environment.filtered_in(REGION_DEPTH, [x, y]).min(mean);
-        self.least[region] = (LEAST_SHARE * rest * solid_angle).max(f32::MIN_POSITIVE);
+        self.least[region] = (LEAST_REGION_SHARE * rest * solid_angle).max(f32::MIN_POSITIVE);
     }
 
     /// Direction in which the light of a region is centered.

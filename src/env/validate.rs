@@ -12,12 +12,12 @@ use alloc::vec::Vec;
 use glam::{Mat3, Vec3};
 
 /// Tag and version of the section that holds the [`EnvironmentHeader`].
-const HEADER: ([u8; 4], u32) = (*b"EHDR", 1);
+const HEADER_SECTION: ([u8; 4], u32) = (*b"EHDR", 1);
 
 impl<'a> EnvironmentView<'a> {
     /// Appends the sections of the environment. `header` is its own header, which has to outlive them.
     pub(crate) fn append_all_sections(&self, header: &'a [EnvironmentHeader; 1], sections: &mut Vec<Section<'a>>) {
-        sections.push(Section::new(HEADER.0, HEADER.1, header));
+        sections.push(Section::new(HEADER_SECTION.0, HEADER_SECTION.1, header));
         self.append_sections(sections);
     }
 
@@ -27,7 +27,7 @@ impl<'a> EnvironmentView<'a> {
     ///
     /// If a section is missing or does not hold what it should.
     pub(crate) fn from_all_sections(sections: &mut Sections<'a>) -> Result<Self, Error> {
-        let header = sections.take_value(HEADER.0, HEADER.1, "header of the environment")?;
+        let header = sections.take_value(HEADER_SECTION.0, HEADER_SECTION.1, "header of the environment")?;
         let environment = Self::from_sections(sections, (header,))?;
         environment.validate()?;
         Ok(environment)

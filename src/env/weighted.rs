@@ -17,10 +17,10 @@ use glam::{Vec2, Vec3};
 ///
 /// Larger: the weight is followed more closely, but a table takes four times the memory and time for each step.
 /// Smaller: the weight varies more within a region.
-const REGION_DEPTH: u32 = 4;
+const WEIGHTED_DEPTH: u32 = 4;
 
 /// Number of regions of all levels. *Proved*: a sum of powers of four.
-const REGIONS: usize = level_start(REGION_DEPTH + 1);
+const WEIGHTED_REGIONS: usize = level_start(WEIGHTED_DEPTH + 1);
 /// Factor on the angle from a region's center to its corners, for edges that bend outwards. *Measured* by the unit test
 /// `regions_stay_in_their_circles`, over all regions of all levels.
 ///
@@ -33,7 +33,7 @@ const REGION_REACH: f32 = 1.1;
 pub(crate) struct DirectionDistribution {
     /// Mean radiance times weight of the regions, then sums over four regions of a finer level, laid out as the
     /// levels of a pyramid.
-    sums: [f32; REGIONS],
+    sums: [f32; WEIGHTED_REGIONS],
     depth: u32,
 }
 
@@ -41,8 +41,8 @@ impl DirectionDistribution {
     /// Weighs every region that is not black by a function of its central world direction and the angle around
     /// it that it reaches to. The weight is zero only where it is for the whole region.
     pub(crate) fn new(environment: &EnvironmentView<'_>, weight: impl Fn(Vec3, f32) -> f32) -> Self {
-        let depth = REGION_DEPTH.min(environment.header.depth);
-        let mut sums = [0.0; REGIONS];
+        let depth = WEIGHTED_DEPTH.min(environment.header.depth);
+        let mut sums = [0.0; WEIGHTED_REGIONS];
         for region in 0..1_u32 << (2 * depth) {
             let (x, y) = (region & ((1 << depth) - 1), region >> depth);
             let mean = environment.mean_at(depth, x, y);
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn regions_stay_in_their_circles() {
-        for depth in 1..=REGION_DEPTH {
+        for depth in 1..=WEIGHTED_DEPTH {
             for region in 0..1_u32 << (2 * depth) {
                 let (x, y) = (region & ((1 << depth) - 1), region >> depth);
                 let (center, reach) = circle(depth, x, y);

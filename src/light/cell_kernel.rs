@@ -44,7 +44,7 @@ const MOST_LEVELS: [u32; 2] = [3, 2];
 
 /// Least weight of a cell that may send light. Proved: products with averages and radiances are made positive again,
 /// and nothing that matters is as small. Larger: more samples where nothing is expected.
-const LEAST_WEIGHT: f32 = 1e-37;
+const LEAST_CELL_WEIGHT: f32 = 1e-37;
 
 /// Rounding of a cell's center relative to the largest coordinate of a vertex, granted to the cone around the cell.
 ///
@@ -149,7 +149,7 @@ impl<'a, L: Lobe> CellKernel<'a, L> {
             let heights = [height + turn * farther[0], height + turn * farther[1], height + turn * farther[2]];
             let toward = lobe.weigh(receiver.mean(heights, distance), [x, y, z], distance, variance / distance2);
             let softened = distance2 + softening;
-            let weight = at_least(scale * toward / (softened * softened), LEAST_WEIGHT);
+            let weight = at_least(scale * toward / (softened * softened), LEAST_CELL_WEIGHT);
             let highest = at_least(at_least(heights[0], heights[1]), heights[2]);
             weights[i] = if highest < horizon { 0.0 } else { weight };
             if LOOKUP {

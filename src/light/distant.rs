@@ -28,7 +28,7 @@ pub(crate) const MOST_GROUPS: usize = 32;
 /// stands in for what rounding may take from the difference of like numbers.
 ///
 /// Larger: samples where the light is all but set. Smaller: rounding shows there.
-const LEAST_SHARE: f64 = 1e-9;
+const LEAST_CAP_SHARE: f64 = 1e-9;
 
 /// Rounding of a direction to single precision. *Proved*: a component is off by at most 6e-8. A larger one gives
 /// densities to directions beside a light.
@@ -182,7 +182,7 @@ fn weigh_cap(receiver: Receiver, cap: &SphericalCap) -> f64 {
         Receiver::Glossy(_) | Receiver::Scattering(_) | Receiver::Microfacet(_) => {
             let estimate = irradiance_of_cap(receiver, cap);
             let is_lit = !receiver.has_horizon() || cap.cos < 0.0 || normal.dot(cap.axis) > -cap.sin;
-            if is_lit { estimate.max(LEAST_SHARE * cap.solid_angle()) } else { 0.0 }
+            if is_lit { estimate.max(LEAST_CAP_SHARE * cap.solid_angle()) } else { 0.0 }
         }
     }
 }
@@ -194,7 +194,7 @@ fn cosine_over_cap(cap: &SphericalCap, normal: DVec3) -> f64 {
     if cap.cos < 0.0 {
         // The hemisphere without the rest of the sphere.
         let rest = SphericalCap { axis: -cap.axis, sin: cap.sin, cos: -cap.cos };
-        return (PI - cosine_over_cap(&rest, normal)).max(LEAST_SHARE);
+        return (PI - cosine_over_cap(&rest, normal)).max(LEAST_CAP_SHARE);
     }
     let (sin, cos) = (cap.sin, cap.cos);
     let height = cap.axis.dot(normal).clamp(-1.0, 1.0);
@@ -210,7 +210,7 @@ fn cosine_over_cap(cap: &SphericalCap, normal: DVec3) -> f64 {
     let root = aside * math::sqrt64(1.0 - y * y);
     let arc = FRAC_PI_2 - math::asin64(y);
     let sum = sin * (sin * height * arc - cos * root) + math::atan2_64(root * sin, cos);
-    sum.max(LEAST_SHARE * sin * sin)
+    sum.max(LEAST_CAP_SHARE * sin * sin)
 }
 
 impl DistantGroup {

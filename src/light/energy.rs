@@ -9,7 +9,7 @@ use crate::parallel;
 /// Least energy of a light relative to the sum of all.
 ///
 /// Proved: above it products with geometric terms down to 1e-8 are normal numbers in single precision.
-const LEAST_ENERGY: f64 = 1e-30;
+const LEAST_ENERGY_SHARE: f64 = 1e-30;
 
 /// What the energy of a light depends on besides the light itself.
 pub(crate) struct Energies<'a> {
@@ -53,7 +53,7 @@ impl<'a> Energies<'a> {
 
     /// Returns the bounds of a light, with its energy relative to that of all.
     pub(crate) fn bounds(&self, light: Light<'_>, total: f64) -> (LightBounds, Moments) {
-        let share = |energy: f64| if energy > 0.0 { (energy / total).max(LEAST_ENERGY) as f32 } else { 0.0 };
+        let share = |energy: f64| if energy > 0.0 { (energy / total).max(LEAST_ENERGY_SHARE) as f32 } else { 0.0 };
         if let Light::Instance(placed) = light {
             let [flux, portal] = placed.energies();
             let portal = self.mean * portal;

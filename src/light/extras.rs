@@ -36,7 +36,7 @@ struct ExtrasHeader {
 const _: () = assert!(size_of::<ExtrasHeader>() == 24);
 
 /// Words of an [`ExtrasHeader`].
-const HEADER: usize = size_of::<ExtrasHeader>() / size_of::<u32>();
+const EXTRAS_HEADER_WORDS: usize = size_of::<ExtrasHeader>() / size_of::<u32>();
 /// Words of a distant light.
 const DISTANT: usize = size_of::<DistantRecord>() / size_of::<u32>();
 /// Words of a group of distant lights.
@@ -86,7 +86,7 @@ fn replace_motion(extras: &mut Vec<u32>, motion: &[u32]) {
     let header = Extras(extras).header();
     extras.truncate(extras.len() - (header.motion as usize).min(extras.len()));
     let header = ExtrasHeader { motion: motion.len() as u32, ..header };
-    if let Some(place) = extras.get_mut(..HEADER) {
+    if let Some(place) = extras.get_mut(..EXTRAS_HEADER_WORDS) {
         place.copy_from_slice(bytemuck::cast_slice(core::slice::from_ref(&header)));
     }
     extras.extend_from_slice(motion);
@@ -106,7 +106,7 @@ impl Lights {
 
 /// Replaces the distant lights and their groups by as many others.
 pub(super) fn replace_distants(extras: &mut [u32], distants: &[DistantRecord], distant_groups: &[DistantGroup]) {
-    let start = HEADER + Extras(extras).header().groups as usize;
+    let start = EXTRAS_HEADER_WORDS + Extras(extras).header().groups as usize;
     let (distants, groups): (&[u32], &[u32]) = (bytemuck::cast_slice(distants), bytemuck::cast_slice(distant_groups));
     let middle = start + distants.len();
     if let Some(place) = extras.get_mut(start..middle) {
@@ -130,7 +130,7 @@ impl<'a> Extras<'a> {
     #[inline]
     fn header(self) -> ExtrasHeader {
         self.0
-            .get(..HEADER)
+            .get(..EXTRAS_HEADER_WORDS)
             .map_or_else(ExtrasHeader::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
     }
 
@@ -138,7 +138,7 @@ impl<'a> Extras<'a> {
     /// refuses, give none.
     #[inline]
     fn words(self, before: usize, count: usize) -> &'a [u32] {
-        let start = HEADER + before;
+        let start = EXTRAS_HEADER_WORDS + before;
         self.0.get(start..start + count).unwrap_or(&[])
     }
 
@@ -207,7 +207,8 @@ impl<'a> Extras<'a> {
             (profile_values, 1),
             (motion, 1),
         ];
-        let words = counts.iter().fold(HEADER as u64, |sum, (count, size)| sum + u64::from(*count) * *size as u64);
+        let words =
+            counts.iter().fold(EXTRAS_HEADER_WORDS as u64, |sum, (count, size)| sum + u64::from(*count) * *size as u64);
         if words != self.0.len() as u64 {
             return Err(Error::bytes("length of groups, profiles, distant lights and motion", 0, self.0.len(), words));
         }
@@ -223,15 +224,15 @@ impl<'a> Extras<'a> {
 /// Returns the header and the arrays, with room for a header where there was none.
 fn header_mut(extras: &mut Vec<u32>) -> &mut ExtrasHeader {
     if extras.is_empty() {
-        extras.resize(HEADER, 0);
+        extras.resize(EXTRAS_HEADER_WORDS, 0);
     }
-    bytemuck::from_bytes_mut(bytemuck::cast_slice_mut(&mut extras[..HEADER]))
+    bytemuck::from_bytes_mut(bytemuck::cast_slice_mut(&mut extras[..EXTRAS_HEADER_WORDS]))
 }
 
 /// Replaces the distant lights and their groups.
 pub(super) fn set_distants(extras: &mut Vec<u32>, distants: &[DistantRecord], distant_groups: &[DistantGroup]) {
     let header = header_mut(extras);
-    let start = HEADER + header.groups as usize;
+    let start = EXTRAS_HEADER_WORDS + header.groups as usize;
     let end = start + header.distants as usize * DISTANT + header.distant_groups as usize * DISTANT_GROUP;
     (header.distants, header.distant_groups) = (distants.len() as u32, distant_groups.len() as u32);
     let words: [&[u32]; 2] = [bytemuck::cast_slice(distants), bytemuck::cast_slice(distant_groups)];
@@ -244,7 +245,7 @@ pub(super) fn add_groups(extras: &mut Vec<u32>, leaves: usize) -> bool {
     let is_new = header.groups == 0;
     if is_new {
         header.groups = leaves as u32 + 1;
-        extras.splice(HEADER..HEADER, core::iter::repeat_n(ALL_GROUPS, leaves + 1));
+        extras.splice(EXTRAS_HEADER_WORDS..EXTRAS_HEADER_WORDS, core::iter::repeat_n(ALL_GROUPS, leaves + 1));
     }
     is_new
 }
@@ -255,7 +256,7 @@ pub(super) fn resize_groups(extras: &mut Vec<u32>, leaves: usize) {
     let groups = Extras(extras).header().groups as usize;
     if groups > 0 && groups < leaves + 1 {
         let more = (2 * groups).max(leaves + 1) - groups;
-        let end = HEADER + groups - 1;
+        let end = EXTRAS_HEADER_WORDS + groups - 1;
         header_mut(extras).groups += more as u32;
         extras.splice(end..end, core::iter::repeat_n(ALL_GROUPS, more));
     }
@@ -265,7 +266,7 @@ pub(super) fn resize_groups(extras: &mut Vec<u32>, leaves: usize) {
 pub(super) fn set_groups(extras: &mut [u32], leaf: u32, groups: u32) {
     let count = Extras(extras).header().groups as usize;
     if (leaf as usize) + 1 < count {
-        extras[HEADER + leaf as usize] = groups;
+        extras[EXTRAS_HEADER_WORDS + leaf as usize] = groups;
     }
 }
 

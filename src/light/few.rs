@@ -29,6 +29,7 @@ use crate::record::{Hit, LightSample, SampledLight};
 use crate::simd::{InstructionSet, Kernel};
 use crate::warp::seed;
 use crate::warp::triangle::square_to_triangle;
+use crate::warp::variate::ALMOST_ONE_F32;
 
 /// Most triangles that are sampled without a tree: lanes of the larger pass. *Chosen*: four lamps of two triangles.
 ///
@@ -48,10 +49,7 @@ const LINEAR_SPREAD: f64 = 0.3;
 /// Least ratio of the weights of two corners of a triangle. *Chosen* with [`LINEAR_SPREAD`].
 ///
 /// Larger: the tree is asked about more triangles at the horizon. Smaller: points far from linear.
-const LEAST_CORNER_RATIO: f64 = 1.0 / 16.0;
-
-/// Largest `f32` below one. *Format* of the number.
-const ALMOST_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+const LEAST_FEW_CORNER_RATIO: f64 = 1.0 / 16.0;
 
 /// A few triangles with the surface that they shine on.
 #[derive(Clone, Copy)]
@@ -151,7 +149,7 @@ impl<'a> FewTriangles<'a> {
             let center2 = (a + b + c).length_squared();
             let is_small = a2 + b2 + c2 <= (1.0 + LINEAR_SPREAD) * (1.0 / 3.0) * center2;
             let (least, largest) = (smaller(smaller(wa, wb), wc), larger(larger(wa, wb), wc));
-            let is_even = is_small & (least > LEAST_CORNER_RATIO * largest);
+            let is_even = is_small & (least > LEAST_FEW_CORNER_RATIO * largest);
             // Positive where the point is on a side that emits.
             let two_sided = u64::from(flags[i] & LightTriangle::TWO_SIDED) << 32;
             let height = f64::from_bits((side.to_bits() ^ 1 << 63) & !two_sided);
@@ -211,7 +209,7 @@ impl<const LANES: usize> Kernel for SampleFew<'_, LANES> {
         }
         // What a choice needs below 2⁻²⁴ is a hash of the other numbers.
         let low = (seed(&[u, v]) >> 11) as f64;
-        let target = (f64::from(limit(choice, ALMOST_ONE)) + low * LOW_STEP) * total;
+        let target = (f64::from(limit(choice, ALMOST_ONE_F32)) + low * LOW_STEP) * total;
         let (mut lane, mut start) = (0, 0.0);
         for end in ends {
             // Never past the last positive weight.

@@ -33,7 +33,7 @@ pub enum Illumination {
 ///
 /// *Chosen*: from the talk's own comparison, which this term is kept for. Larger values send samples to the horizon.
 /// Zero loses light there.
-const LEAST_CELL_COSINE: f32 = 0.01;
+const LEAST_POINT_COSINE: f32 = 0.01;
 
 /// Share of the conservative term that the boundary integral keeps where rounding makes it vanish.
 ///
@@ -72,7 +72,7 @@ impl Illumination {
         let inverse = 1.0 / math::sqrt(distance2);
         let cos_l = (height * inverse).min(1.0);
         let cos_s = receiver.weight_at_height(heights.iter().sum::<f32>() * (1.0 / 3.0), inverse);
-        let least = LEAST_CELL_COSINE;
+        let least = LEAST_POINT_COSINE;
         let conservative = area * (1.0 + cos_s).max(least) * (1.0 + cos_l) * (0.25 * FRAC_1_PI) / distance2;
         match self {
             Self::ClampedVertices | Self::Conservative => conservative,
@@ -116,7 +116,7 @@ fn lobe_factor(receiver: Receiver, cell: &CellView) -> f32 {
     }
     let inverse = 1.0 / math::sqrt(cell.distance2);
     let cosine = receiver.weight_at_height(cell.heights.iter().sum::<f32>() * (1.0 / 3.0), inverse);
-    let toward = cosine.max(LEAST_CELL_COSINE) * math::sqrt(cell.distance2);
+    let toward = cosine.max(LEAST_POINT_COSINE) * math::sqrt(cell.distance2);
     cell.with_lobe(receiver, toward) / toward
 }
 

@@ -69,7 +69,7 @@ pub(crate) use motion::MovingTriangle;
 pub use profile::Profile;
 pub use projection::Projection;
 pub(crate) use triangle::{LightTriangle, POSITION_LIMIT};
-pub(crate) use triangle_view::TriangleView;
+pub(crate) use triangle_view::{FARTHEST_POINT, TriangleView};
 
 /// Marks a triangle that is not in the tree because it emits nothing, whatever its shape. *Format.*
 pub(crate) const NO_LEAF: u32 = u32::MAX;

@@ -39,7 +39,7 @@ const CELL_SHARES: [f32; 2] = [0.4, 0.05];
 /// Share of directions below which there are none. Chosen: shares are counted from it, so that nothing jumps.
 ///
 /// Larger: fewer points pay for two densities. Smaller: more do that gain next to nothing.
-const LEAST_SHARE: f32 = 0.05;
+const LEAST_DIRECTION_SHARE: f32 = 0.05;
 
 /// Shares of points that are drawn by direction, and by the cells of the texture.
 #[derive(Clone, Copy)]
@@ -163,7 +163,7 @@ fn share_at(contrast: f32, noise: f32) -> f32 {
     let most = 1.0 - at_least(of_contrast * at_most(contrast, 1.0), least);
     // Where the noise is infinite, this is not a number.
     let share = most * at_most(noise / (noise + contrast), 1.0);
-    (share - LEAST_SHARE) * (1.0 / (1.0 - LEAST_SHARE))
+    (share - LEAST_DIRECTION_SHARE) * (1.0 / (1.0 - LEAST_DIRECTION_SHARE))
 }
 
 /// Returns the relative variance of averages; zero if all of them are.

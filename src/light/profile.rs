@@ -7,7 +7,7 @@
 use core::f32::consts::{PI, TAU};
 use core::f64::consts::{PI as PI64, TAU as TAU64};
 
-use super::profile_values::{HEADER, ProfileCollection, REACH_MARGIN, push_sums};
+use super::profile_values::{ProfileCollection, REACH_MARGIN, TABLE_HEADER, push_sums};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
 use crate::math;
@@ -170,7 +170,7 @@ impl ProfileCollection {
     pub(super) fn add(&mut self, profile: &Profile<'_>) -> Result<ProfileId, Error> {
         profile.check()?;
         let [rows, columns] = [profile.vertical.len() - 1, profile.horizontal.len()];
-        let end = self.values.len() + HEADER + rows + 1 + columns + (rows + 1) * columns + rows * columns;
+        let end = self.values.len() + TABLE_HEADER + rows + 1 + columns + (rows + 1) * columns + rows * columns;
         if u32::try_from(end).is_err() {
             return Err(Error(ErrorKind::TooMany { what: "values of profiles", count: end, limit: u32::MAX as usize }));
         }
@@ -201,7 +201,7 @@ pub(super) struct ProfileTable<'a> {
 
 impl<'a> ProfileTable<'a> {
     /// Returns the table of these values after a header, if there are as many as there should be.
-    pub(super) fn new([rows, columns, ..]: [f32; HEADER], values: &'a [f32]) -> Option<Self> {
+    pub(super) fn new([rows, columns, ..]: [f32; TABLE_HEADER], values: &'a [f32]) -> Option<Self> {
         let [rows, columns] = [rows as usize, columns as usize];
         let cells = rows.checked_sub(1)?.checked_mul(columns)?;
         let (vertical, values) = values.split_at_checked(rows)?;

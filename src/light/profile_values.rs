@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 /// Values in front of a table: numbers of vertical and horizontal angles, mean intensity, and largest vertical angle at
 /// which anything is sent. *Format.*
-pub(super) const HEADER: usize = 4;
+pub(super) const TABLE_HEADER: usize = 4;
 
 /// Widening of the largest vertical angle, in radians. *Proved*: covers the rounding of angles to single precision,
 /// 2e-7. A larger one culls less.
@@ -15,7 +15,7 @@ pub(super) const REACH_MARGIN: f32 = 1e-6;
 /// most cells of a profile add up to 2, so that nothing that is lit is without a share.
 ///
 /// Larger: more rays from what is dark.
-pub(super) const LEAST_SHARE: f64 = 2.4e-7;
+pub(super) const LEAST_LIT_SHARE: f64 = 2.4e-7;
 
 /// All profiles of a scene on their way into a sampler.
 #[derive(Debug, Default)]
@@ -34,7 +34,7 @@ impl ProfileCollection {
 /// Appends the shares of these powers, added up; of what is lit, none is so small that it vanishes.
 pub(super) fn push_sums(values: &mut Vec<f32>, powers: impl Iterator<Item = f64> + Clone) {
     let total: f64 = powers.clone().sum();
-    let share = |power: f64| if power > 0.0 { (power / total).max(LEAST_SHARE) } else { 0.0 };
+    let share = |power: f64| if power > 0.0 { (power / total).max(LEAST_LIT_SHARE) } else { 0.0 };
     let all: f64 = powers.clone().map(share).sum();
     let mut sum = 0.0;
     for power in powers {

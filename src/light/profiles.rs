@@ -3,7 +3,7 @@
 use core::f32::consts::PI;
 
 use super::profile::ProfileTable;
-use super::profile_values::{HEADER, ProfileCollection};
+use super::profile_values::{ProfileCollection, TABLE_HEADER};
 use super::projection::ProjectionTable;
 use crate::blas;
 use crate::error::{Error, ErrorKind};
@@ -76,7 +76,7 @@ impl<'a> Profiles<'a> {
     pub(super) fn get(&self, profile: u32) -> Option<Distribution<'a>> {
         let starts = self.starts.get(profile as usize..)?;
         let [start, end, ..] = starts else { return None };
-        let (header, values) = self.values.get(*start as usize..*end as usize)?.split_first_chunk::<HEADER>()?;
+        let (header, values) = self.values.get(*start as usize..*end as usize)?.split_first_chunk::<TABLE_HEADER>()?;
         let by = if header[0] < 0.0 {
             Table::Image(ProjectionTable::new(*header, values)?)
         } else {

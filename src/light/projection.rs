@@ -8,7 +8,7 @@
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use super::profile_values::{HEADER, ProfileCollection, REACH_MARGIN, push_sums};
+use super::profile_values::{ProfileCollection, REACH_MARGIN, TABLE_HEADER, push_sums};
 use crate::blas;
 use crate::error::{Error, ErrorKind};
 use crate::math;
@@ -146,7 +146,7 @@ impl ProfileCollection {
     pub(super) fn add_projection(&mut self, image: &Projection<'_>) -> Result<ProfileId, Error> {
         image.check()?;
         let ([width, height], tangents) = (image.size, image.tangents());
-        let end = self.values.len() + HEADER + VIEW + height + 2 * width * height;
+        let end = self.values.len() + TABLE_HEADER + VIEW + height + 2 * width * height;
         if u32::try_from(end).is_err() {
             return Err(Error(ErrorKind::TooMany { what: "values of profiles", count: end, limit: u32::MAX as usize }));
         }
@@ -244,7 +244,7 @@ pub(super) struct ProjectionTable<'a> {
 
 impl<'a> ProjectionTable<'a> {
     /// Returns the table of these values after a header, if there are as many as there should be.
-    pub(super) fn new([rows, columns, ..]: [f32; HEADER], values: &'a [f32]) -> Option<Self> {
+    pub(super) fn new([rows, columns, ..]: [f32; TABLE_HEADER], values: &'a [f32]) -> Option<Self> {
         let size = [columns as usize, -rows as usize];
         let count = size[0].checked_mul(size[1]).filter(|_| size.iter().all(|n| (1..=MOST_TEXELS).contains(n)))?;
         let ([x, y, filter], values) = values.split_first_chunk::<VIEW>()?;

@@ -28,7 +28,7 @@ const SIDE_BITS: u32 = SIDE.trailing_zeros();
 /// Columns of each of two spherical triangles that share a step.
 const HALF: usize = SIDE / 2;
 /// Cells of a step. Lane `row * SIDE + column`: sums over the rows are sums of vectors.
-const LANES: usize = SIDE * SIDE;
+const GRID_LANES: usize = SIDE * SIDE;
 
 /// Most steps. *Measured* on the window under clouds (docs/ACCURACY.md, "Wide steps"): the third takes the
 /// energy-weighted variance from 0.065 to 0.033, for less than 1 % more time.
@@ -137,13 +137,13 @@ trait GridGuide {
         cell: &GridCell,
         column_bits: u32,
         sums: &[f32; SIDE],
-        weights: &[f32; LANES],
+        weights: &[f32; GRID_LANES],
     ) -> Option<([usize; 2], f64)>;
 }
 
 /// Weights of the cells of a column.
 #[inline(always)]
-fn rows_of(weights: &[f32; LANES], column: usize) -> [f32; SIDE] {
+fn rows_of(weights: &[f32; GRID_LANES], column: usize) -> [f32; SIDE] {
     let mut rows = [0.0; SIDE];
     for (j, row) in rows.iter_mut().enumerate() {
         *row = weights[j * SIDE + column % SIDE];
@@ -163,7 +163,7 @@ impl GridGuide for DrawCell {
         _cell: &GridCell,
         _column_bits: u32,
         sums: &[f32; SIDE],
-        weights: &[f32; LANES],
+        weights: &[f32; GRID_LANES],
     ) -> Option<([usize; 2], f64)> {
         let (column, share) = pick_wide(sums, &mut self.u[1])?;
         let (row, share_of_column) = pick_wide(&rows_of(weights, column), &mut self.u[0])?;
@@ -183,7 +183,7 @@ impl GridGuide for FollowPoint {
         cell: &GridCell,
         column_bits: u32,
         sums: &[f32; SIDE],
-        weights: &[f32; LANES],
+        weights: &[f32; GRID_LANES],
     ) -> Option<([usize; 2], f64)> {
         let GridPoint { part, fixed: [column, row] } = self.point;
         let column = (column >> (FIXED_BITS - cell.column_bits - column_bits)) as usize & ((1 << column_bits) - 1);
@@ -207,11 +207,11 @@ struct Step {
     /// Level that the environment is looked up in, by column.
     levels: Levels,
     /// Weights of the cells.
-    weights: [f32; LANES],
+    weights: [f32; GRID_LANES],
     /// Points of the square of the environment that the cells' centers lie at.
-    points: [[f32; LANES]; 2],
+    points: [[f32; GRID_LANES]; 2],
     /// Texels of the levels.
-    texels: [u32; LANES],
+    texels: [u32; GRID_LANES],
 }
 
 /// Levels of the environment, by column.
@@ -234,9 +234,9 @@ impl Step {
             solid_angles: [0.0; SIDE],
             least: [0.0; SIDE],
             levels: Levels::default(),
-            weights: [0.0; LANES],
-            points: [[0.0; LANES]; 2],
-            texels: [0; LANES],
+            weights: [0.0; GRID_LANES],
+            points: [[0.0; GRID_LANES]; 2],
+            texels: [0; GRID_LANES],
         }
     }
 }
@@ -324,7 +324,7 @@ impl<'a, L: Lobe> SphericalGrid<'a, L> {
             let column_bits = if is_shared { SIDE_BITS - 1 } else { SIDE_BITS };
             let ([column, row], chosen) = guide.choose(&cell, column_bits, &sums, &step.weights)?;
             pmf *= chosen;
-            let lane = (row * SIDE + column) % LANES;
+            let lane = (row * SIDE + column) % GRID_LANES;
             cell = GridCell {
                 part: if is_shared { column / HALF } else { cell.part },
                 column: cell.column << column_bits | (column as u32 & ((1 << column_bits) - 1)),
@@ -433,7 +433,13 @@ impl<'a, L: Lobe> SphericalGrid<'a, L> {
     /// with the square root of `v`; then across. There the end of the arc moves by at most δ, so that the chord changes
     /// by no more than that, and the arc turns around the pole by at most γ.
     #[inline(always)]
-    fn cover(&self, environment: &EnvironmentView<'_>, cell: &GridCell, is_shared: bool, step: &Step) -> [u32; LANES] {
+    fn cover(
+        &self,
+        environment: &EnvironmentView<'_>,
+        cell: &GridCell,
+        is_shared: bool,
+        step: &Step,
+    ) -> [u32; GRID_LANES] {
         let (mut ends, mut turns, mut chords) = ([0.0; SIDE], [0.0; SIDE], [0.0; SIDE]);
         for side in [0.0, 1.0] {
             let mut edges = SphericalColumns::default();
@@ -449,7 +455,7 @@ impl<'a, L: Lobe> SphericalGrid<'a, L> {
         let finest = environment.size() as f32;
         let ([_, v], [_, height]) = (cell.corner(), cell.size());
         let (v, stride) = (v as f32, height as f32 * (1.0 / SIDE as f32));
-        let mut texels = [0; LANES];
+        let mut texels = [0; GRID_LANES];
         for j in 0..SIDE {
             let [low, center, high] = [0.0, 0.5, 1.0].map(|share| math::sqrt(v + (j as f32 + share) * stride));
             for i in 0..SIDE {

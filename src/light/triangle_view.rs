@@ -10,10 +10,12 @@ use crate::math;
 use crate::receiver::{Effort, Receiver, ReceiverKind, ShadingPoint};
 use crate::warp::equal_area::sphere_to_square_quickly;
 
-/// Largest coordinate of a shading point that anything arrives at.
+/// Largest coordinate of a shading point that anything arrives at. *Format*: documented at
+/// [`ShadingPoint::position`](crate::ShadingPoint::position).
 ///
-/// Proved: squares of distances, 1e30, are finite, and so are their products with weights of up to 1e8.
-pub(super) const FARTHEST_POINT: f32 = 1e15;
+/// *Proved* to be small enough: squares of distances, 1e30, are finite, and so are their products with weights of up to
+/// 1e8.
+pub(crate) const FARTHEST_POINT: f32 = 1e15;
 
 /// A triangle is close if its squared radius is more than this many times the squared distance from its plane.
 ///

@@ -41,7 +41,7 @@ pub(super) const LEAST_OUTGOING: f32 = 1e-3;
 ///
 /// Chosen with [`EVEN_SHARE`], which vanishes where the mean cosine does. Larger: more samples at the horizon. Smaller:
 /// what little of a cluster stands over the horizon of a lobe starves.
-pub(super) const LEAST_WEIGHT: f32 = 1e-3;
+pub(super) const LEAST_LOBE_WEIGHT: f32 = 1e-3;
 
 /// Least squared length of the sum of two unit vectors. *Proved*: rounding leaves as much of opposite ones.
 pub(super) const LEAST_SUM2: f32 = 1e-7;
@@ -217,7 +217,7 @@ impl Lobe for GgxLobe {
         let inverse = 1.0 / distance;
         let [x, y, z] = center;
         let value = self.value(toward * inverse, [x * inverse, y * inverse, z * inverse], spread2);
-        self.diffuse * toward + distance * (value + LEAST_WEIGHT * self.share)
+        self.diffuse * toward + distance * (value + LEAST_LOBE_WEIGHT * self.share)
     }
 
     /// The logarithm of D changes by 4 h / (α² + h²) for each step of the half vector, which is 2 / √(α² + h²) where

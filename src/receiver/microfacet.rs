@@ -23,7 +23,7 @@ use core::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::glossy::{LEAST_OUTGOING, LEAST_ROUGHNESS, LEAST_WEIGHT};
+use super::glossy::{LEAST_LOBE_WEIGHT, LEAST_OUTGOING, LEAST_ROUGHNESS};
 use super::lambert::{lambert, solid_angle};
 use super::lanes::ReceiverLanes;
 use super::lobe::{EVEN_SHARE, Lobe, unit_or_zero};
@@ -293,7 +293,7 @@ impl Microfacet {
                     share: transmitted,
                 },
             ],
-            least: LEAST_WEIGHT * (reflected + transmitted),
+            least: LEAST_LOBE_WEIGHT * (reflected + transmitted),
             transmits: if self.transmits() { 1.0 } else { 0.0 },
         }
     }

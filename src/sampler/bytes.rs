@@ -42,7 +42,7 @@ impl Parameters {
 }
 
 /// Tag and version of the section that holds the [`RegionMoments`].
-const REGIONS: ([u8; 4], u32) = (*b"EREG", 1);
+const REGIONS_SECTION: ([u8; 4], u32) = (*b"EREG", 1);
 
 impl<'a> LightSamplerView<'a> {
     /// Returns everything as bytes, to be written to disk, mapped, shared or uploaded, and to be read by
@@ -73,7 +73,7 @@ impl<'a> LightSamplerView<'a> {
         let header = [environment.header];
         environment.append_all_sections(&header, &mut sections);
         if let Some(sky) = sky {
-            sections.push(Section::new(REGIONS.0, REGIONS.1, core::slice::from_ref(*sky)));
+            sections.push(Section::new(REGIONS_SECTION.0, REGIONS_SECTION.1, core::slice::from_ref(*sky)));
         }
         write(&sections)
     }
@@ -132,7 +132,7 @@ impl<'a> LightSamplerView<'a> {
 
 /// Takes the section of the regions, and checks them.
 fn take_regions<'a>(sections: &mut Sections<'a>) -> Result<&'a RegionMoments, Error> {
-    match sections.take::<RegionMoments>(REGIONS.0, REGIONS.1, "regions of the environment")? {
+    match sections.take::<RegionMoments>(REGIONS_SECTION.0, REGIONS_SECTION.1, "regions of the environment")? {
         [regions] => {
             regions.validate()?;
             Ok(regions)

@@ -24,7 +24,7 @@ use crate::warp::{Variate, seed};
 
 /// Least weight of a candidate with a positive target. *Proved*: what underflows stays possible, and the sum of any
 /// number of candidates that there can be is finite.
-const LEAST_WEIGHT: f64 = 1e-200;
+const LEAST_CANDIDATE_WEIGHT: f64 = 1e-200;
 
 /// A sample that was chosen among several candidates: see [`PointSampler::sample_resampled`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,7 +105,7 @@ impl PointSampler<'_> {
             if value == 0.0 {
                 return;
             }
-            let weight = (value / f64::from(self.density_of_contribution(&sample))).max(LEAST_WEIGHT);
+            let weight = (value / f64::from(self.density_of_contribution(&sample))).max(LEAST_CANDIDATE_WEIGHT);
             // A reservoir of one: the new candidate takes the place with the probability of its share.
             let total = sum + weight;
             let offset = choice.value() * total;

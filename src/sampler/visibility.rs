@@ -54,9 +54,9 @@ const PASSES: [f64; 3] = [0.25, 0.25, 0.5];
 const UNLEARNED: f64 = 0.5;
 
 /// Rays that are counted together. *Chosen*: it decides about memory and waiting, not about results.
-const CHUNK: u64 = 1 << 13;
+const RAYS_AT_ONCE: u64 = 1 << 13;
 
-/// Chunks between two merges. *Chosen*, as [`CHUNK`].
+/// Chunks between two merges. *Chosen*, as [`RAYS_AT_ONCE`].
 const CHUNKS: u64 = 64;
 
 impl LightSampler {
@@ -427,13 +427,13 @@ fn learn(
             LightSamplerView { visibility: Some(visibility.as_view()), ..unlearned }
         };
         while first < end {
-            let batch_end = end.min(first + CHUNK * CHUNKS);
-            let chunks: Vec<u64> = (first..batch_end).step_by(CHUNK as usize).collect();
+            let batch_end = end.min(first + RAYS_AT_ONCE * CHUNKS);
+            let chunks: Vec<u64> = (first..batch_end).step_by(RAYS_AT_ONCE as usize).collect();
             let counted = parallel::map(&chunks, 2, |&start| {
                 progress.check()?;
                 let mut counters = learner.counters();
                 counters.unlearned_share = if pass == 0 { 1.0 } else { UNLEARNED };
-                let rays = start..batch_end.min(start + CHUNK);
+                let rays = start..batch_end.min(start + RAYS_AT_ONCE);
                 progress.add((rays.end - rays.start) as usize);
                 for ray in rays {
                     let x = points(ray);

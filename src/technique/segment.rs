@@ -23,7 +23,7 @@ use crate::warp::{Variate, pick};
 /// Number of bins. *Chosen*: a budget of memory; a beam is found to a bin at each end.
 ///
 /// Larger: narrow beams are met more closely. Smaller: more samples beside them.
-const BINS: usize = 32;
+const BEAM_BINS: usize = 32;
 /// Number of probes. *Chosen*: a budget of time; each weighs the root of the tree once.
 ///
 /// Larger: more time for each segment. Smaller: hazy beams are met less closely.
@@ -37,11 +37,17 @@ const MOST_FEATURES: usize = 4;
 /// Larger: lattices of many triangles cost more. Smaller: beams through their last triangles are left to the even
 /// share.
 const MOST_PORTALS: u32 = 256;
+/// Least optical depth of a segment along which the transmittance is taken to vary. *Proved*: below it the
+/// transmittance is 1 but for 1e-9, and single precision rounds by 6e-8. No depth that is divided by is zero.
+///
+/// Larger: distances that do not follow the transmittance. Smaller: nothing but rounding.
+const LEAST_DEPTH: f64 = 1e-9;
+
 /// Least probability of the even share, and of each of the others where it finds anything. Estimates know of no walls.
 /// *Chosen*, not swept; as for the environment next to the lights.
 ///
 /// Larger: samples where little arrives. Smaller: fireflies where an estimate is too low.
-const LEAST_SHARE: f64 = 0.1;
+const LEAST_DISTANCE_SHARE: f64 = 0.1;
 
 /// A stretch of a ray in a medium.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +65,7 @@ pub(crate) struct Distances {
     /// Sum of the clusters' weights.
     sum: f64,
     /// What beams bring to each bin.
-    bins: [f32; BINS],
+    bins: [f32; BEAM_BINS],
     /// Sum of the bins.
     beams: f64,
     /// Probabilities of the clusters, the beams and the even share.
@@ -78,13 +84,13 @@ impl MediumSegment {
     /// Integral of the transmittance.
     fn reach(&self) -> f64 {
         let depth = self.extinction * self.length();
-        if depth < 1e-9 { self.length() } else { -math::exp_m1_64(-depth) / self.extinction }
+        if depth < LEAST_DEPTH { self.length() } else { -math::exp_m1_64(-depth) / self.extinction }
     }
 
     /// Draws a distance by the transmittance.
     fn draw(&self, u: f64) -> f64 {
         let depth = self.extinction * self.length();
-        if depth < 1e-9 {
+        if depth < LEAST_DEPTH {
             return u * self.length();
         }
         -math::ln_1p64(u * math::exp_m1_64(-depth)) / self.extinction
@@ -110,7 +116,8 @@ impl Distances {
             cluster.weight = brought.clamp(f64::from(f32::MIN_POSITIVE), 1e35) as f32;
         }
         let sum = clusters.iter().map(|cluster| f64::from(cluster.weight)).sum();
-        let mut distances = Self { segment, clusters, sum, bins: [0.0; BINS], beams: 0.0, shares: [0.0, 0.0, 1.0] };
+        let mut distances =
+            Self { segment, clusters, sum, bins: [0.0; BEAM_BINS], beams: 0.0, shares: [0.0, 0.0, 1.0] };
         distances.find_beams(scene, groups);
         distances.probe(scene, groups);
         distances.beams = distances.bins.iter().map(|bin| f64::from(*bin)).sum();
@@ -124,7 +131,9 @@ impl Distances {
         let x = ShadingPoint::volume(self.segment.stretch.origin + middle).with_groups(groups);
         let even = Viewpoint { scene: *scene, x, visibility: None }.irradiance_everywhere() * self.segment.reach();
         let total = self.sum + self.beams + even;
-        let share = |own: f64| if own > 0.0 { LEAST_SHARE + (1.0 - 3.0 * LEAST_SHARE) * own / total } else { 0.0 };
+        let share = |own: f64| {
+            if own > 0.0 { LEAST_DISTANCE_SHARE + (1.0 - 3.0 * LEAST_DISTANCE_SHARE) * own / total } else { 0.0 }
+        };
         if total > 0.0 && total.is_finite() {
             let [clusters, beams] = [share(self.sum), share(self.beams)].map(|share| share as f32);
             self.shares = [clusters, beams, 1.0 - clusters - beams];
@@ -189,7 +198,7 @@ impl Distances {
 
     /// Adds light that arrives over a range of distances.
     fn fill(&mut self, start: f64, end: f64, irradiance: f32) {
-        let width = self.segment.length() / BINS as f64;
+        let width = self.segment.length() / BEAM_BINS as f64;
         let first = (start / width) as usize;
         for (i, bin) in self.bins.iter_mut().enumerate().skip(first) {
             let (low, high) = (i as f64 * width, (i + 1) as f64 * width);
@@ -209,7 +218,7 @@ impl Distances {
             0 => self.draw_equiangular(u),
             1 => {
                 let bin = pick(&self.bins, self.beams, &mut u);
-                (bin as f64 + u.value()) * (self.segment.length() / BINS as f64)
+                (bin as f64 + u.value()) * (self.segment.length() / BEAM_BINS as f64)
             }
             _ => self.segment.draw(u.value()),
         };
@@ -251,8 +260,8 @@ impl Distances {
         let [clusters, beams, even] = self.shares.map(|share| f64::from(share) / total);
         let mut pdf = even * self.segment.pdf(distance);
         if beams > 0.0 {
-            let width = self.segment.length() / BINS as f64;
-            let bin = ((distance / width) as usize).min(BINS - 1);
+            let width = self.segment.length() / BEAM_BINS as f64;
+            let bin = ((distance / width) as usize).min(BEAM_BINS - 1);
             pdf += beams * f64::from(self.bins[bin]) / (self.beams * width);
         }
         if clusters > 0.0 {

@@ -5,7 +5,9 @@ use core::f64::consts::PI;
 use glam::Vec3;
 
 use crate::env::{EnvironmentView, RegionMoments};
-use crate::light::{FewTriangles, LightKind, LightLeaf, LightPoint, LightView, LightsView, LocalPoint, MOST_FEW};
+use crate::light::{
+    FARTHEST_POINT, FewTriangles, LightKind, LightLeaf, LightPoint, LightView, LightsView, LocalPoint, MOST_FEW,
+};
 use crate::math::{at_least, only_if};
 use crate::receiver::ShadingPoint;
 use crate::record::LightSample;
@@ -77,15 +79,11 @@ pub(crate) struct Viewpoint<'a> {
     pub(crate) visibility: Option<RegionFactors<'a>>,
 }
 
-/// Largest coordinate of a position at which anything arrives. *Format*: documented at
-/// [`ShadingPoint::position`](crate::ShadingPoint::position).
-const POSITION_LIMIT: f32 = 1e15;
-
 impl Viewpoint<'_> {
     /// Whether anything can arrive at the position at all.
     #[inline]
     pub(crate) fn is_somewhere(&self) -> bool {
-        self.x.position.abs().cmple(Vec3::splat(POSITION_LIMIT)).all()
+        self.x.position.abs().cmple(Vec3::splat(FARTHEST_POINT)).all()
     }
 
     /// Returns a light as seen from here; `None` if nothing can arrive from it.

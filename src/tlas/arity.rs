@@ -20,7 +20,7 @@ pub enum Arity {
 }
 
 /// Largest number of lanes of all arities. *Format*: the largest value of [`Arity`].
-pub(super) const MAX_LANES: usize = 16;
+pub(crate) const MAX_LANES: usize = 16;
 
 impl Arity {
     /// Returns the number of children that a node has room for.

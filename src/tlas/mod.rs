@@ -15,6 +15,7 @@ mod walk;
 mod words;
 
 pub use arity::Arity;
+pub(crate) use arity::MAX_LANES;
 #[cfg(test)]
 use build::build;
 pub(crate) use build::build_in_groups;

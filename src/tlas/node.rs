@@ -18,8 +18,8 @@ pub(super) const ALL: u8 = u8::MAX;
 /// Largest code of a mean position, at the side of the box. *Format.*
 pub(super) const MEAN_STEPS: f32 = 127.0;
 /// Number of steps per unit of the square root of the tangent of a cone's half angle. The root makes the codes of
-/// narrow cones finer. *Format*: with 254 steps, tangents end at 15.8, which is above the tangent of `WIDEST_CONE`;
-/// smaller steps could not reach it, larger ones widen all cones.
+/// narrow cones finer. *Format*: with 254 steps, tangents end at 15.8, which is above the tangent of
+/// `WIDEST_STORED_CONE`; smaller steps could not reach it, larger ones widen all cones.
 pub(super) const TANGENT_STEPS: f32 = 64.0;
 
 /// Up to `N` children, in few bits each (after Ylitie, Karras and Laine 2017): first other nodes, which are neighbors

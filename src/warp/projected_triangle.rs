@@ -28,7 +28,7 @@ const MOST_STEPS: usize = 16;
 /// quadratically, so that about its square is left.
 ///
 /// Larger: directions that do not quite follow the density. Smaller: one more step.
-const LEAST_STEP: f64 = 1e-4;
+const LEAST_AZIMUTH_STEP: f64 = 1e-4;
 
 /// Least projected area. Chosen: of what is smaller, rounding of 1e-16 may be more than 1e-6.
 ///
@@ -209,7 +209,7 @@ impl Wedge {
             let next = if next > low && next < high { next } else { 0.5 * (low + high) };
             let step = next - t;
             t = next;
-            if step.abs() < LEAST_STEP {
+            if step.abs() < LEAST_AZIMUTH_STEP {
                 break;
             }
         }

@@ -12,7 +12,7 @@ const REFILL_BELOW: f64 = 1.0 / (1u64 << 20) as f64;
 const ALMOST_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
 /// Largest `f32` below one. *Format* of the number.
-const ALMOST_ONE_F32: f32 = 1.0 - f32::EPSILON / 2.0;
+pub(crate) const ALMOST_ONE_F32: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// Spacing of the doubles just below one, 2^-53. *Format* of the number.
 const STEP: f64 = f64::EPSILON / 2.0;

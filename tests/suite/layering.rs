@@ -1,5 +1,7 @@
-//! Modules import only what lies below them: the table of the design, read against every `crate::` path in `src`.
+//! Modules import only what lies below them: the table of the design, read against every `crate::` path in `src`. No
+//! name of a constant stands for two values.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -167,6 +169,43 @@ fn violations(file: &Path, source: &str) -> Vec<String> {
     found
 }
 
+/// Names and values of the constants at the top of a file. Those of an `impl`, of a trait or of a function are others.
+fn constants(source: &str) -> Vec<(String, String)> {
+    let (chars, text) = (without_comments(source), source.chars().collect::<Vec<_>>());
+    let starts =
+        ["const", "static"].map(|keyword| words(&chars, keyword).into_iter().map(move |at| (at, at + keyword.len())));
+    let mut depths = Vec::new();
+    let mut depth = 0;
+    for c in &chars {
+        depth += i32::from("{[(".contains(*c)) - i32::from("}])".contains(*c));
+        depths.push(depth);
+    }
+    let find = |from: usize, what: char| (from..chars.len()).find(|&i| chars[i] == what && depths[i] == 0);
+    let constant = |(before, at): (usize, usize)| {
+        let name: String = chars[at..].iter().skip_while(|c| c.is_whitespace()).take_while(|c| is_word(**c)).collect();
+        let before = chars[..before].iter().rev().find(|c| !c.is_whitespace());
+        // Not a parameter.
+        let is_item = depths[at] == 0 && !matches!(before, Some('<' | ','));
+        let is_constant = is_item && name.chars().all(|c| !c.is_lowercase()) && name != "_";
+        let start = find(at, '=').filter(|_| is_constant)? + 1;
+        let value = text[start..find(start, ';')?].iter().filter(|c| !c.is_whitespace()).collect();
+        Some((name, value))
+    };
+    starts.into_iter().flatten().filter_map(constant).collect()
+}
+
+/// The names of constants with several values, with these values and their files.
+fn ambiguous_constants(files: &[(String, String)]) -> Vec<String> {
+    let mut values: BTreeMap<String, BTreeMap<String, &str>> = BTreeMap::new();
+    for (file, source) in files {
+        for (name, value) in constants(source) {
+            values.entry(name).or_default().entry(value).or_insert(file);
+        }
+    }
+    let several = values.into_iter().filter(|(_, values)| values.len() > 1);
+    several.map(|(name, values)| format!("`{name}`: {values:?}")).collect()
+}
+
 /// All source files but unit tests, which may look at everything.
 pub(crate) fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("the folder can be read") {
@@ -227,4 +266,28 @@ fn imports_from_above_and_from_siblings_are_found() {
     assert_eq!(count("buffers.rs", "use crate::error::Error;"), 0);
     assert_eq!(count("buffers.rs", "use crate::math;"), 1);
     assert_eq!(count("stray.rs", ""), 1);
+}
+
+#[test]
+fn names_of_constants_stand_for_one_value() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut paths = Vec::new();
+    files(&root, &mut paths);
+    let read = |path: &PathBuf| (path.display().to_string(), fs::read_to_string(path).expect("the file can be read"));
+    let files: Vec<_> = paths.iter().map(read).collect();
+    let count: usize = files.iter().map(|(_, source)| constants(source).len()).sum();
+    assert!(count > 200, "only {count} constants are found");
+    let found = ambiguous_constants(&files);
+    assert!(found.is_empty(), "give each value a name of its own:\n{}", found.join("\n"));
+}
+
+#[test]
+fn constants_of_several_values_are_found() {
+    let file = |name: &str, source: &str| (name.to_owned(), source.to_owned());
+    let first = "const A: [u8; 2] = [1, 2];\npub(crate) static B: &str = \"a\";\nconst _: () = ();\nconst C: u8 = 1;\n\
+                 impl<const A: u8> T {\n    const VERSION: u32 = 1;\n}\nconst fn f() -> u8 { 0 }";
+    let second =
+        "// const C: u8 = 2;\nconst A: [u8;2] = [1,\n 2];\nconst B: &str = \"b\";\nimpl T { const VERSION: u32 = 2; }";
+    let found = ambiguous_constants(&[file("x.rs", first), file("y.rs", second)]);
+    assert_eq!(found, ["`B`: {\"\\\"a\\\"\": \"x.rs\", \"\\\"b\\\"\": \"y.rs\"}"]);
 }

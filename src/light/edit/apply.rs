@@ -11,7 +11,7 @@ use crate::env::Environment;
 use crate::error::{Error, ErrorKind};
 use crate::light::distant;
 use crate::light::distant_record::DistantRecord;
-use crate::light::instance::{InstanceRecord, PlacedObject, RECORD_WORDS, emits, first_object, records, records_mut};
+use crate::light::instance::{INSTANCE_WORDS, InstanceRecord, PlacedObject, emits, first_object, records, records_mut};
 use crate::light::{
     Energies, Light, LightCollection, LightKind, LightTriangle, Lights, MovingTriangle, NO_AREA, NO_LEAF, extras,
 };
@@ -363,7 +363,7 @@ impl LightsState {
 
     fn instance_words(&self, lights: &Lights, changes: &BTreeMap<u32, Option<InstanceChange>>) -> usize {
         let more = self.instance_count(lights, changes) - records(&lights.instances).len();
-        lights.instances.len() + self.unplaced.objects.len() + more.saturating_mul(RECORD_WORDS)
+        lights.instances.len() + self.unplaced.objects.len() + more.saturating_mul(INSTANCE_WORDS)
     }
 
     /// Makes room for the records of all instances.
@@ -383,7 +383,7 @@ impl LightsState {
         let end = first_object(before);
         lights.instances.splice(end..end, bytemuck::cast_slice(&spare).iter().copied());
         lights.instances[0] = count as u32;
-        let moved = ((count - before) * RECORD_WORDS) as u32;
+        let moved = ((count - before) * INSTANCE_WORDS) as u32;
         let known = records_mut(&mut lights.instances).iter_mut().take(before);
         known.for_each(|record| record.object += moved);
     }

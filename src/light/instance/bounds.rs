@@ -25,7 +25,7 @@ const SIMILARITY_MARGIN: f32 = 2e-4;
 
 /// Widening of a cone of normals, in radians, for rounding. *Proved*: the arcsine and its argument are off by about
 /// 1e-7 each, but next to a right angle, where the cone is as good as a half-space. Larger: a little less is culled.
-const CONE_ROUNDING: f32 = 1e-6;
+const MAPPED_CONE_ROUNDING: f32 = 1e-6;
 
 impl PlacedObject<'_> {
     /// Returns the factor that areas are multiplied by, as the root of its mean square by energy; exact for a
@@ -129,5 +129,5 @@ pub(super) fn mapped_cone_of(areas: &DMat3, axis: Vec3, theta: f32) -> Cone {
         return Cone { axis, theta: PI };
     }
     let spread = norm(areas) * f64::from(sin / cos) / image.length();
-    Cone { axis, theta: if spread < 1.0 { math::asin(spread as f32) + CONE_ROUNDING } else { PI } }
+    Cone { axis, theta: if spread < 1.0 { math::asin(spread as f32) + MAPPED_CONE_ROUNDING } else { PI } }
 }

@@ -177,11 +177,11 @@ fn corners([low, high]: [Vec3; 2]) -> impl Iterator<Item = Vec3> {
 }
 
 /// Words of a record. *Format.*
-pub(super) const RECORD_WORDS: usize = size_of::<InstanceRecord>() / size_of::<u32>();
+pub(super) const INSTANCE_WORDS: usize = size_of::<InstanceRecord>() / size_of::<u32>();
 
 /// Returns the first word of the first object, which follows `instances` instances.
 pub(super) fn first_object(instances: usize) -> usize {
-    1 + instances * RECORD_WORDS
+    1 + instances * INSTANCE_WORDS
 }
 
 /// Returns the records of all instances. *Format*: the words are the number of instances, their records, and the
@@ -189,14 +189,14 @@ pub(super) fn first_object(instances: usize) -> usize {
 #[inline]
 pub(super) fn records(words: &[u32]) -> &[InstanceRecord] {
     let Some((&count, rest)) = words.split_first() else { return &[] };
-    let words = rest.get(..(count as usize).saturating_mul(RECORD_WORDS)).unwrap_or(&[]);
+    let words = rest.get(..(count as usize).saturating_mul(INSTANCE_WORDS)).unwrap_or(&[]);
     bytemuck::try_cast_slice(words).unwrap_or(&[])
 }
 
 /// Returns the records of all instances, to be changed.
 pub(super) fn records_mut(words: &mut [u32]) -> &mut [InstanceRecord] {
     let Some((&mut count, rest)) = words.split_first_mut() else { return &mut [] };
-    let words = rest.get_mut(..(count as usize).saturating_mul(RECORD_WORDS)).unwrap_or(&mut []);
+    let words = rest.get_mut(..(count as usize).saturating_mul(INSTANCE_WORDS)).unwrap_or(&mut []);
     bytemuck::try_cast_slice_mut(words).unwrap_or(&mut [])
 }
 

@@ -10,7 +10,7 @@ use super::bounds::mapped_cone_of;
 use super::{Instance, InstanceFault, InstanceRecord, LARGEST_CONDITION, LARGEST_SCALE, PlacedObject};
 use crate::geometry::{Cone, Placement, cofactors, determinants, norm};
 use crate::light::Extras;
-use crate::light::motion::{EndColumns, PARTS, convex_cone, simpson, widened};
+use crate::light::motion::{EndColumns, SHUTTER_PARTS, convex_cone, simpson, widened};
 
 /// Most times that the interval is halved to prove that a transform can be inverted. *Chosen*: bounds over a thousandth
 /// of the interval are those of a moment.
@@ -164,9 +164,9 @@ impl<'a> PlacedObject<'a> {
     /// of it.
     pub(super) fn moving_cone(&self, axis: Vec3, theta: f32) -> Option<Cone> {
         let end = self.end?;
-        let linear = |i: usize| self.placement_at(end, i as f64 / PARTS as f64).linear;
+        let linear = |i: usize| self.placement_at(end, i as f64 / SHUTTER_PARTS as f64).linear;
         let sign = determinant_of(&linear(0)).signum();
-        let all = (0..PARTS).map(|i| {
+        let all = (0..SHUTTER_PARTS).map(|i| {
             let cones = cofactors(&linear(i), &linear(i + 1)).map(|areas| mapped_cone_of(&(areas * sign), axis, theta));
             convex_cone(cones.map(Some))
         });

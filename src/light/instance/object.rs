@@ -58,13 +58,13 @@ pub(crate) struct ObjectHeader {
 const _: () = assert!(size_of::<ObjectHeader>() == 148);
 
 /// Words of the header. *Format.*
-const HEADER_WORDS: usize = size_of::<ObjectHeader>() / size_of::<u32>();
+const OBJECT_HEADER_WORDS: usize = size_of::<ObjectHeader>() / size_of::<u32>();
 /// Words of a triangle. *Format.*
-const RECORD_WORDS: usize = size_of::<LightTriangle>() / size_of::<u32>();
+const TRIANGLE_WORDS: usize = size_of::<LightTriangle>() / size_of::<u32>();
 
 /// The header of an object without lights, for a reference that leads nowhere; checked bytes have none.
-static NOTHING: ObjectHeader = ObjectHeader {
-    words: HEADER_WORDS as u32,
+static NO_OBJECT: ObjectHeader = ObjectHeader {
+    words: OBJECT_HEADER_WORDS as u32,
     arity: 4,
     nodes: 0,
     lights: 0,
@@ -105,12 +105,12 @@ impl<'a> Object<'a> {
     /// Returns the object that starts at a word.
     #[inline]
     pub(crate) fn at(objects: &'a [u32], start: u32) -> Self {
-        let split = objects.get(start as usize..).and_then(|words| words.split_at_checked(HEADER_WORDS));
+        let split = objects.get(start as usize..).and_then(|words| words.split_at_checked(OBJECT_HEADER_WORDS));
         let header = split.and_then(|(header, words)| {
             let header = bytemuck::try_from_bytes(bytemuck::cast_slice(header)).ok()?;
             Some(Self { header, words })
         });
-        header.unwrap_or(Self { header: &NOTHING, words: &[] })
+        header.unwrap_or(Self { header: &NO_OBJECT, words: &[] })
     }
 
     /// Returns the number of words that an object with these counts takes; `None` where that overflows.
@@ -119,7 +119,7 @@ impl<'a> Object<'a> {
             [header.nodes, header.lights, header.meshes, header.triangles].map(|count| count as usize);
         let tree = TlasView::word_count(Arity::from_code(header.arity)?, nodes, lights)?;
         let ways = meshes.checked_add(1)?.checked_add(triangles)?;
-        HEADER_WORDS.checked_add(tree)?.checked_add(lights.checked_mul(RECORD_WORDS)?)?.checked_add(ways)
+        OBJECT_HEADER_WORDS.checked_add(tree)?.checked_add(lights.checked_mul(TRIANGLE_WORDS)?)?.checked_add(ways)
     }
 
     #[inline]
@@ -145,7 +145,7 @@ impl<'a> Object<'a> {
     pub(super) fn parts(&self) -> Parts<'a> {
         let (tree, rest) = self.split();
         let take = |from: &'a [u32], count: usize| from.split_at_checked(count).unwrap_or((&[], &[]));
-        let (records, rest) = take(rest, self.header.lights as usize * RECORD_WORDS);
+        let (records, rest) = take(rest, self.header.lights as usize * TRIANGLE_WORDS);
         let (meshes, rest) = take(rest, self.header.meshes as usize + 1);
         let (leaf_of, _) = take(rest, self.header.triangles as usize);
         Parts { tree, records: bytemuck::try_cast_slice(records).unwrap_or(&[]), meshes, leaf_of }
@@ -297,8 +297,8 @@ pub(in crate::light) fn object_records_mut(words: &mut [u32], mut change: impl F
         let object = Object::at(words, start as u32);
         let (end, lights) = (start + object.header.words as usize, object.len());
         let tree = TlasView::word_count(object.tree().arity, object.header.nodes as usize, lights).unwrap_or(0);
-        let first = start + HEADER_WORDS + tree;
-        let records = words.get_mut(first..first + lights * RECORD_WORDS).unwrap_or(&mut []);
+        let first = start + OBJECT_HEADER_WORDS + tree;
+        let records = words.get_mut(first..first + lights * TRIANGLE_WORDS).unwrap_or(&mut []);
         let records: &mut [LightTriangle] = bytemuck::try_cast_slice_mut(records).unwrap_or(&mut []);
         records.iter_mut().for_each(&mut change);
         start = end;

@@ -13,7 +13,7 @@ use crate::light::LightTriangle;
 use crate::light::triangle_view::FARTHEST_POINT;
 use crate::math::{at_least, only_if};
 use crate::receiver::{PlacedLobe, RoundedPoint, ShadingPoint, for_lobe, own_receiver};
-use crate::tlas::{FactorBytes, LeafOracle, TlasView};
+use crate::tlas::{FactorBytes, LeafOracle, MAX_LANES, TlasView};
 use crate::warp::Variate;
 
 /// How far rounding moves a shading point along an axis when it is mapped, relative to its largest coordinate.
@@ -23,9 +23,6 @@ const POINT_ROUNDING: f32 = 1.5e-7;
 /// Margin of a shading point so far away in the object's space that it is moved nearer, relative to its distance.
 /// *Proved*: the object's coordinates, up to 1e9, are 1e-6 of that.
 const FAR_ROUNDING: f32 = 1e-5;
-
-/// Largest number of lanes of a node. *Format.*
-const LANES: usize = 16;
 
 /// An object's light tree, as it is walked for one shading point.
 #[derive(Clone, Copy, Debug)]
@@ -164,12 +161,12 @@ impl LeafOracle for ObjectWalk<'_> {
     fn radiances(&self, centers: [&[f32]; 3], radii: &[f32], set: u32, radiances: &mut [f32]) {
         let Some(environment) = self.environment else { return radiances.fill(1.0) };
         let mean = environment.mean_without_features();
-        let count = radii.len().min(LANES);
+        let count = radii.len().min(MAX_LANES);
         if mean <= 0.0 || count < radii.len() {
             return radiances.fill(0.0);
         }
         let [a, b, c] = self.placement.linear.to_cols_array_2d().map(|column| column.map(|value| value as f32));
-        let (mut mapped, mut mapped_radii) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        let (mut mapped, mut mapped_radii) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
         for i in 0..count {
             for axis in 0..3 {
                 mapped[axis][i] = a[axis] * centers[0][i] + b[axis] * centers[1][i] + c[axis] * centers[2][i];

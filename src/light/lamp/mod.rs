@@ -53,7 +53,7 @@ const UNIT_ROUNDING: f64 = 2.5e-7;
 
 /// Least radius and length. *Proved*: areas are normal numbers in single precision. A larger one would refuse tiny
 /// lamps.
-const LEAST_LENGTH: f32 = 1e-15;
+const LEAST_LAMP_LENGTH: f32 = 1e-15;
 
 /// A light that is not made of triangles.
 ///
@@ -521,7 +521,7 @@ fn check_weight(what: &'static str, value: f32) -> Result<(), LampFault> {
 
 /// `Ok` if a radius or another length is positive and not too large.
 fn check_length(what: &'static str, value: f32) -> Result<(), LampFault> {
-    within(what, value, [LEAST_LENGTH, POSITION_LIMIT], "from 1e-15 to 1e9")
+    within(what, value, [LEAST_LAMP_LENGTH, POSITION_LIMIT], "from 1e-15 to 1e9")
 }
 
 /// `Ok` if a position is finite, and nothing in this distance of it is too far away.

@@ -24,7 +24,7 @@ const AREA: f32 = 4.0;
 /// wider is no cone for a node of the tree, whose cones end at a right angle less 0.08.
 ///
 /// Larger: wide lights are taken for surfaces. Smaller: fewer lights are culled by their cones.
-const WIDEST_CONE: f32 = 1.45;
+const WIDEST_PROFILE_CONE: f32 = 1.45;
 
 /// A point without an extent whose intensity is given by a [`Profile`], such as that of a luminaire.
 ///
@@ -128,7 +128,7 @@ impl LampKind for ProfileLight {
 
     fn reach(&self, profiles: Profiles<'_>) -> Reach {
         let emission = profiles.get(self.profile).map_or(PI, |table| table.reach);
-        let is_focused = emission < WIDEST_CONE;
+        let is_focused = emission < WIDEST_PROFILE_CONE;
         Reach {
             aabb: Aabb { min: self.position, max: self.position },
             normals: if is_focused { Cone::single(self.axis) } else { Cone { axis: Vec3::Z, theta: PI } },

@@ -10,7 +10,7 @@ use core::f32::consts::PI;
 use glam::{DVec3, Vec3};
 
 use super::{
-    LEAST_LENGTH, LampFault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_length, check_position,
+    LEAST_LAMP_LENGTH, LampFault, LampKind, Reach, ShapeView, ShapeViewKind, VALUES, check_length, check_position,
     check_weight, irradiance_of_directions, within,
 };
 use crate::geometry::{Aabb, Cone};
@@ -76,7 +76,7 @@ impl LampKind for TubeLight {
     fn check(&self) -> Result<(), LampFault> {
         check_length("radius", self.radius)?;
         self.ends.iter().try_for_each(|end| check_position("end", *end, self.radius))?;
-        within("length", self.length(), [LEAST_LENGTH, 4.0 * POSITION_LIMIT], "at least 1e-15")?;
+        within("length", self.length(), [LEAST_LAMP_LENGTH, 4.0 * POSITION_LIMIT], "at least 1e-15")?;
         check_weight("radiance", self.radiance)
     }
 

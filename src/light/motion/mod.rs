@@ -21,7 +21,7 @@ use super::POSITION_LIMIT;
 use crate::error::Error;
 
 pub(crate) use triangle::MovingTriangle;
-pub(super) use triangle::{PARTS, convex_cone, end_vertices, has_area_between, simpson, widened};
+pub(super) use triangle::{SHUTTER_PARTS, convex_cone, end_vertices, has_area_between, simpson, widened};
 
 /// Vertices of a triangle at the end of the interval.
 pub(super) type EndVertices = [[f32; 3]; 3];
@@ -43,13 +43,13 @@ struct MotionHeader {
 const _: () = assert!(size_of::<MotionHeader>() == 12);
 
 /// Words of a [`MotionHeader`]. *Format.*
-const HEADER: usize = size_of::<MotionHeader>() / size_of::<u32>();
+const MOTION_HEADER_WORDS: usize = size_of::<MotionHeader>() / size_of::<u32>();
 /// Words of a [`MovingMesh`]. *Format.*
-const MESH: usize = size_of::<MovingMesh>() / size_of::<u32>();
+const MESH_WORDS: usize = size_of::<MovingMesh>() / size_of::<u32>();
 /// Words of the vertices of a triangle. *Format.*
-const VERTICES: usize = size_of::<EndVertices>() / size_of::<u32>();
+const VERTICES_WORDS: usize = size_of::<EndVertices>() / size_of::<u32>();
 /// Words of the columns of a transform. *Format.*
-const COLUMNS: usize = size_of::<EndColumns>() / size_of::<u32>();
+const COLUMNS_WORDS: usize = size_of::<EndColumns>() / size_of::<u32>();
 
 /// Where the triangles of a mesh that moves are.
 #[repr(C)]
@@ -78,29 +78,29 @@ impl<'a> Motion<'a> {
     #[inline]
     fn header(self) -> MotionHeader {
         self.0
-            .get(..HEADER)
+            .get(..MOTION_HEADER_WORDS)
             .map_or_else(MotionHeader::default, |words| *bytemuck::from_bytes(bytemuck::cast_slice(words)))
     }
 
     /// Returns `count` words, after `before` words of the arrays before. Words that are not there, which validation
     /// refuses, give none.
     fn words(self, before: usize, count: usize) -> &'a [u32] {
-        let start = HEADER + before;
+        let start = MOTION_HEADER_WORDS + before;
         self.0.get(start..start + count).unwrap_or(&[])
     }
 
     fn meshes(self) -> &'a [MovingMesh] {
-        bytemuck::cast_slice(self.words(0, self.header().meshes as usize * MESH))
+        bytemuck::cast_slice(self.words(0, self.header().meshes as usize * MESH_WORDS))
     }
 
     fn triangles(self) -> &'a [EndVertices] {
         let MotionHeader { meshes, triangles, .. } = self.header();
-        bytemuck::cast_slice(self.words(meshes as usize * MESH, triangles as usize * VERTICES))
+        bytemuck::cast_slice(self.words(meshes as usize * MESH_WORDS, triangles as usize * VERTICES_WORDS))
     }
 
     fn words_before_instances(self) -> usize {
         let MotionHeader { meshes, triangles, .. } = self.header();
-        meshes as usize * MESH + triangles as usize * VERTICES
+        meshes as usize * MESH_WORDS + triangles as usize * VERTICES_WORDS
     }
 
     /// Returns the numbers of the instances that move, in ascending order.
@@ -110,7 +110,7 @@ impl<'a> Motion<'a> {
 
     fn columns(self) -> &'a [EndColumns] {
         let instances = self.header().instances as usize;
-        bytemuck::cast_slice(self.words(self.words_before_instances() + instances, instances * COLUMNS))
+        bytemuck::cast_slice(self.words(self.words_before_instances() + instances, instances * COLUMNS_WORDS))
     }
 
     /// Whether the mesh whose first triangle has this number moves.
@@ -140,9 +140,10 @@ impl<'a> Motion<'a> {
             return Ok(());
         }
         let MotionHeader { meshes, triangles, instances } = self.header();
-        let sizes = [(meshes, MESH), (triangles, VERTICES), (instances, 1 + COLUMNS)];
-        let words = sizes.iter().fold(HEADER as u64, |sum, (count, size)| sum + u64::from(*count) * *size as u64);
-        if words != self.0.len() as u64 || words == HEADER as u64 {
+        let sizes = [(meshes, MESH_WORDS), (triangles, VERTICES_WORDS), (instances, 1 + COLUMNS_WORDS)];
+        let words =
+            sizes.iter().fold(MOTION_HEADER_WORDS as u64, |sum, (count, size)| sum + u64::from(*count) * *size as u64);
+        if words != self.0.len() as u64 || words == MOTION_HEADER_WORDS as u64 {
             return Err(Error::bytes("length of what moves", 0, self.0.len(), words));
         }
         let ascends = |pair: &[MovingMesh]| pair[0].first < pair[1].first && pair[0].start <= pair[1].start;

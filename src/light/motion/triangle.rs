@@ -18,11 +18,11 @@ use crate::receiver::{ReceiverKind, ShadingPoint};
 /// half a turn has a narrow cone in each.
 ///
 /// Larger: fits take longer. Smaller: fast turns give cones that hold every direction.
-pub(in crate::light) const PARTS: usize = 8;
+pub(in crate::light) const SHUTTER_PARTS: usize = 8;
 
 /// Widening of a cone of normals, in radians, for rounding. *Proved*: axes and angles in single precision are off by
 /// about 1e-7 each, as those of the cones that are united. Larger: a little less is culled.
-const CONE_ROUNDING: f32 = 2e-6;
+const UNITED_CONE_ROUNDING: f32 = 2e-6;
 
 /// Returns the vertices of triangles at the end of the interval.
 pub(in crate::light) fn end_vertices(positions: &[Vec3], indices: &[[u32; 3]]) -> Vec<EndVertices> {
@@ -119,8 +119,8 @@ impl<'a> MovingTriangle<'a> {
     /// Returns a cone that holds the normals at all times: in each part of the interval they lie between the
     /// coefficients of the area's vector.
     fn normals(&self) -> Cone {
-        let edges = |i: usize| self.at(i as f64 / PARTS as f64).edges();
-        let all = (0..PARTS).map(|i| convex_cone(area_vectors(edges(i), edges(i + 1)).map(direction)));
+        let edges = |i: usize| self.at(i as f64 / SHUTTER_PARTS as f64).edges();
+        let all = (0..SHUTTER_PARTS).map(|i| convex_cone(area_vectors(edges(i), edges(i + 1)).map(direction)));
         widened(all.flatten().reduce(Cone::union))
     }
 }
@@ -134,14 +134,14 @@ fn direction(vector: DVec3) -> Option<Cone> {
 pub(in crate::light) fn convex_cone(cones: [Option<Cone>; 3]) -> Option<Cone> {
     let cone = cones.into_iter().flatten().reduce(Cone::union)?;
     // A cone is convex up to a right angle.
-    Some(if cone.theta < FRAC_PI_2 - 2.0 * CONE_ROUNDING { cone } else { Cone { axis: cone.axis, theta: PI } })
+    Some(if cone.theta < FRAC_PI_2 - 2.0 * UNITED_CONE_ROUNDING { cone } else { Cone { axis: cone.axis, theta: PI } })
 }
 
 /// Returns a cone a little wider than one that has been united from others.
 pub(in crate::light) fn widened(cone: Option<Cone>) -> Cone {
     cone.map_or(Cone { axis: Vec3::Z, theta: PI }, |Cone { axis, theta }| Cone {
         axis,
-        theta: (theta + CONE_ROUNDING).min(PI),
+        theta: (theta + UNITED_CONE_ROUNDING).min(PI),
     })
 }
 

@@ -44,7 +44,7 @@ const SQUARE_ROUNDING: f32 = 3e-6;
 ///
 /// Larger: openings beside the feature count. Smaller: one that shows the feature's edge, and nothing else does, is
 /// listed with next to no weight.
-const LEAST_SHARE: f32 = 0.05;
+const LEAST_COVERED_SHARE: f32 = 0.05;
 
 /// A part of a triangle through which a feature is visible.
 #[derive(Clone, Copy, Debug)]
@@ -218,7 +218,8 @@ impl<'a> FeatureView<'a> {
             let reach = radius + sine * distance;
             let reach2 = reach * reach + SQUARE_ROUNDING * distance2;
             let across2 = (distance2 - if along > 0.0 { along * along } else { 0.0 }).max(0.0);
-            let covered = ((radius + spread * distance - math::sqrt(across2)) * per_radius).clamp(LEAST_SHARE, 1.0);
+            let covered =
+                ((radius + spread * distance - math::sqrt(across2)) * per_radius).clamp(LEAST_COVERED_SHARE, 1.0);
             *share = if reach2 < across2 { 0.0 } else { covered };
         }
         shares

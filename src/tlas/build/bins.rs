@@ -4,11 +4,11 @@
 use glam::Vec3A;
 
 use super::cluster::{Cluster, Item, Units};
-use crate::parallel::{CHUNK, reduce};
+use crate::parallel::{SUM_CHUNK, reduce};
 
 /// Largest number of bins per axis. *Measured* (docs/ACCURACY.md, "Building without cones"): from 8 to 24 bins the
 /// choice is as good, and each bin costs build time.
-const BINS: usize = 10;
+const MOST_BINS: usize = 10;
 /// Smallest number of bins per axis, for sets of fewer lights than that. More bins than lights stay empty, fewer leave
 /// no choice.
 /// *Measured*: docs/CONSTANTS.md, "Constants of the build"; not sensitive.
@@ -61,7 +61,7 @@ impl Extent {
         let Scratch { bins, sides } = scratch;
         let spread = self.center_high - self.center_low;
         // Few lights leave most bins empty.
-        let count = items.len().clamp(FEWEST_BINS, BINS);
+        let count = items.len().clamp(FEWEST_BINS, MOST_BINS);
         let binning = Binning::new(self.center_low, spread, count);
         let edges = self.all.high - self.all.low;
         let longest = edges.max_element();
@@ -100,8 +100,8 @@ pub(super) struct Scratch {
 impl Scratch {
     pub(super) fn new() -> Self {
         Self {
-            bins: [[Cluster::EMPTY; BINS]; 3],
-            sides: SplitSides { clusters: [[Cluster::EMPTY; LANES]; FOURS], count: 0 },
+            bins: [[Cluster::EMPTY; MOST_BINS]; 3],
+            sides: SplitSides { clusters: [[Cluster::EMPTY; COST_LANES]; FOURS], count: 0 },
         }
     }
 }
@@ -130,7 +130,7 @@ struct Binning {
     last: u32,
 }
 
-type Bins = [[Cluster; BINS]; 3];
+type Bins = [[Cluster; MOST_BINS]; 3];
 
 impl Binning {
     fn new(start: Vec3A, spread: Vec3A, bins: usize) -> Self {
@@ -159,12 +159,12 @@ impl Binning {
 
     /// Adds lights to empty bins. `is_flat` leaves out where they face.
     fn fill(&self, items: &[Item], reference: Vec3A, is_flat: bool, bins: &mut Bins) {
-        if items.len() <= CHUNK {
+        if items.len() <= SUM_CHUNK {
             self.add(items, reference, is_flat, bins);
             return;
         }
         let part = |items: &[Item]| {
-            let mut bins = [[Cluster::EMPTY; BINS]; 3];
+            let mut bins = [[Cluster::EMPTY; MOST_BINS]; 3];
             self.add(items, reference, is_flat, &mut bins);
             bins
         };
@@ -195,13 +195,13 @@ impl Binning {
 }
 
 /// Clusters whose costs are computed at once.
-const LANES: usize = 4;
+const COST_LANES: usize = 4;
 /// Most fours of clusters that are compared for one split: two sides of each boundary.
-const FOURS: usize = (3 * 2 * (BINS - 1)).div_ceil(LANES);
+const FOURS: usize = (3 * 2 * (MOST_BINS - 1)).div_ceil(COST_LANES);
 
 /// What is on the left and on the right of each boundary that is compared.
 struct SplitSides {
-    clusters: [[Cluster; LANES]; FOURS],
+    clusters: [[Cluster; COST_LANES]; FOURS],
     count: usize,
 }
 
@@ -226,8 +226,8 @@ impl SplitSides {
     /// Returns the cost of a split at each boundary: that of both sides together. All clusters have the given `M_Ω` if
     /// there is one.
     fn costs(&self, units: &Units, one_measure: Option<f32>) -> impl Iterator<Item = f32> {
-        let mut costs = [[0.0; LANES]; FOURS];
-        for (costs, clusters) in costs.iter_mut().zip(&self.clusters[..self.count.div_ceil(LANES)]) {
+        let mut costs = [[0.0; COST_LANES]; FOURS];
+        for (costs, clusters) in costs.iter_mut().zip(&self.clusters[..self.count.div_ceil(COST_LANES)]) {
             *costs = Cluster::costs(clusters, units, one_measure).to_array();
         }
         (0..self.count).step_by(2).map(move |i| costs.as_flattened()[i] + costs.as_flattened()[i + 1])

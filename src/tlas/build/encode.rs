@@ -19,7 +19,7 @@ const BOX_STEPS: f64 = 253.0;
 const BOX_MARGIN: f64 = 1.0 / 32.0;
 /// Least unit of the boxes. *Proved*: flat boxes divide by it, and any positive number keeps that from being 0 / 0. A
 /// much larger one would widen the boxes of tiny scenes.
-const LEAST_STEP: f64 = 1e-30;
+const LEAST_BOX_STEP: f64 = 1e-30;
 /// Length of normals in steps: shorter than [`NORMAL_STEPS`], so that rounding by half a step in each component makes
 /// no normal longer than one (*proved*: √3 / 2 is below 1). The test by the cone is then on the safe side.
 const NORMAL_SCALE: f32 = NORMAL_STEPS - 1.0;
@@ -32,11 +32,11 @@ const CONE_MARGIN: f32 = 1e-4;
 const TANGENT_MARGIN: f32 = 2.5e-4;
 /// Half angle in radians from which on a cone counts as a half-space. *Format*: its tangent, 12.5, must stay below the
 /// largest that a code can hold. A smaller one culls less.
-const WIDEST_CONE: f32 = FRAC_PI_2 - 0.08;
+const WIDEST_STORED_CONE: f32 = FRAC_PI_2 - 0.08;
 
 /// Least length of a mean normal that is a direction. Below it the axis of the cone stands in; the length itself is
 /// then stored as zero, *format*: half a step of a byte is 2e-3.
-const LEAST_LENGTH: f32 = 1e-3;
+const LEAST_NORMAL_LENGTH: f32 = 1e-3;
 
 impl<const N: usize> Node<N> {
     /// Writes what is known of all children, in the order of the lanes.
@@ -44,7 +44,7 @@ impl<const N: usize> Node<N> {
         let whole = children.iter().fold(Aabb::EMPTY, |aabb, (bounds, _)| aabb.union(bounds.aabb));
         self.origin = whole.min.to_array();
         let extent = whole.max.as_dvec3() - whole.min.as_dvec3();
-        self.steps = (extent / BOX_STEPS).to_array().map(|step| rounded_up(step.max(LEAST_STEP)));
+        self.steps = (extent / BOX_STEPS).to_array().map(|step| rounded_up(step.max(LEAST_BOX_STEP)));
         for (lane, (bounds, moments)) in children.iter().enumerate() {
             self.set_box(lane, &bounds.aabb, moments);
             self.set_cone(lane, bounds, moments);
@@ -75,7 +75,7 @@ impl<const N: usize> Node<N> {
 
     fn set_cone(&mut self, lane: usize, bounds: &LightBounds, moments: &Moments) {
         let length = moments.normal.length();
-        let direction = if length > LEAST_LENGTH { moments.normal / length } else { bounds.normals.axis };
+        let direction = if length > LEAST_NORMAL_LENGTH { moments.normal / length } else { bounds.normals.axis };
         let code = |value: f32| (value * NORMAL_SCALE + 0.5f32.copysign(value)) as i32;
         let [x, y, z] = direction.to_array().map(|value| code(value) as u32 & 0x3ff);
         let normal = x | y << 10 | z << 20;
@@ -84,12 +84,12 @@ impl<const N: usize> Node<N> {
         let axis = Vec3::from_array([0, 1, 2].map(|axis| Self::component(normal, axis))).normalize_or_zero();
         let theta = bounds.normals.theta + angle(axis, bounds.normals.axis) + CONE_MARGIN;
         // What sends into less than a hemisphere has a cone of all directions that it sends in, if that is narrow.
-        let (is_everywhere, is_focused) = (bounds.emission > FRAC_PI_2, theta + bounds.emission < WIDEST_CONE);
+        let (is_everywhere, is_focused) = (bounds.emission > FRAC_PI_2, theta + bounds.emission < WIDEST_STORED_CONE);
         let shape = if is_everywhere || is_focused { LANE_SHAPED } else { 0 };
         self.normals[lane] = normal | side | shape;
         let theta = if is_focused { theta + bounds.emission } else { theta };
         // Of a two-sided light one side always faces the shading point.
-        self.tangents[lane] = if bounds.two_sided || is_everywhere || !(theta < WIDEST_CONE) {
+        self.tangents[lane] = if bounds.two_sided || is_everywhere || !(theta < WIDEST_STORED_CONE) {
             WIDE
         } else {
             let (sin, cos) = math::sin_cos(theta);

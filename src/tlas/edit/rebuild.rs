@@ -11,12 +11,12 @@ use crate::tlas::node::{Child, Node, Slot};
 
 /// Energy of a light that is switched off, for the build, which expects all lights to have some. *Chosen*: far below
 /// that of any light.
-const LEAST_ENERGY: f32 = 1e-36;
+const SWITCHED_OFF_ENERGY: f32 = 1e-36;
 
 /// Returns the bounds by which a light finds its place.
 fn placing(mut bounds: LightBounds) -> LightBounds {
-    if !(bounds.energy() > LEAST_ENERGY) {
-        bounds.flux = LEAST_ENERGY;
+    if !(bounds.energy() > SWITCHED_OFF_ENERGY) {
+        bounds.flux = SWITCHED_OFF_ENERGY;
     }
     bounds
 }

@@ -15,7 +15,7 @@ use crate::tlas::node::{Child, LANE_TWO_SIDED, Node, WIDE, wide};
 
 /// Rounding granted to the distance from a cone, relative to that of the cluster. *Proved*: covers the rounding of the
 /// axis to ten bits a component, which is in the angle of the cone, and of the sums, 1e-6. A larger one culls less.
-const CONE_ROUNDING: f32 = 1e-5;
+const CLUSTER_CONE_ROUNDING: f32 = 1e-5;
 
 impl<const N: usize> Node<N> {
     /// Returns the estimates, corrected for the children marked with
@@ -61,7 +61,7 @@ impl<const N: usize> Node<N> {
         let (axis, [sin, cos], _) = self.cone(lane);
         let along = -axis.dot(center);
         let across = math::sqrt((distance * distance - along * along).max(0.0));
-        if across * cos - along * sin > radius + CONE_ROUNDING * distance {
+        if across * cos - along * sin > radius + CLUSTER_CONE_ROUNDING * distance {
             estimates.weights[lane] = 0.0;
             estimates.doubtful.iter_mut().for_each(|set| *set &= !bit);
             estimates.opened &= !bit;
