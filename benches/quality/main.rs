@@ -17,6 +17,7 @@ mod harmonics;
 mod instruction_set;
 mod methods;
 mod metrics;
+mod mixed;
 mod oracle;
 mod parallel;
 mod plot;
@@ -73,6 +74,7 @@ fn run_part(args: &Args, part: &Part, objects: &mut Vec<String>) -> Result<(), F
 fn table(args: &Args, objects: &mut Vec<String>) -> Result<(), Failure> {
     report::print_head();
     let mut rows: Vec<Row> = scenes::NAMES.iter().flat_map(|name| comparison::run(name, args)).collect();
+    rows.extend(mixed::run(args));
     rows.extend(building::NAMES.iter().flat_map(|name| building::run(name, args)));
     if rows.is_empty() {
         return Err(format!("no workload and method of these names; workloads are {}", scenes::workloads()).into());

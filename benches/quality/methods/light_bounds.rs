@@ -6,25 +6,33 @@ use core::f32::consts::{FRAC_PI_2, PI};
 use ::fanlight::{Receiver, ShadingPoint};
 use glam::Vec3;
 
-/// Box, cone of normals and flux. All lights are one-sided and diffuse: the emission ends at a right angle.
+/// Box, cone of normals, the angle around these at which the emission ends, and flux. All lights are one-sided.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightBounds {
     pub(crate) min: Vec3,
     pub(crate) max: Vec3,
     axis: Vec3,
     cos_o: f32,
+    cos_e: f32,
     pub(crate) phi: f32,
 }
 
 impl LightBounds {
+    /// Bounds of a diffuse triangle, whose emission ends at a right angle.
     pub(crate) fn of_triangle(vertices: [Vec3; 3], normal: Vec3, phi: f32) -> Self {
         let [a, b, c] = vertices;
-        Self { min: a.min(b).min(c), max: a.max(b).max(c), axis: normal, cos_o: 1.0, phi }
+        Self::of_box([a.min(b).min(c), a.max(b).max(c)], (normal, 1.0), 0.0, phi)
+    }
+
+    /// Bounds of any light, by the corners of its box, its cone of normals and the cosine at which its emission ends.
+    pub(crate) fn of_box([min, max]: [Vec3; 2], (axis, cos_o): (Vec3, f32), cos_e: f32, phi: f32) -> Self {
+        Self { min, max, axis, cos_o, cos_e, phi }
     }
 
     pub(crate) fn union(a: Self, b: Self) -> Self {
         let (axis, cos_o) = cone_union((a.axis, a.cos_o), (b.axis, b.cos_o));
-        Self { min: a.min.min(b.min), max: a.max.max(b.max), axis, cos_o, phi: a.phi + b.phi }
+        let cos_e = a.cos_e.min(b.cos_e);
+        Self { min: a.min.min(b.min), max: a.max.max(b.max), axis, cos_o, cos_e, phi: a.phi + b.phi }
     }
 
     pub(crate) fn center(&self) -> Vec3 {
@@ -34,7 +42,7 @@ impl LightBounds {
     /// `EvaluateCost`: flux times orientation term times area.
     pub(crate) fn cost(&self) -> f32 {
         let theta_o = self.cos_o.clamp(-1.0, 1.0).acos();
-        let theta_w = (theta_o + FRAC_PI_2).min(PI);
+        let theta_w = (theta_o + self.cos_e.acos()).min(PI);
         let sin_o = sine(self.cos_o);
         let orientation = 2.0 * PI * (1.0 - self.cos_o)
             + FRAC_PI_2
@@ -70,7 +78,7 @@ impl LightBounds {
         let cos_x = cos_sub_clamped(sin_w, cos_w, sin_o, self.cos_o);
         let sin_x = sin_sub_clamped(sin_w, cos_w, sin_o, self.cos_o);
         let cos_p = cos_sub_clamped(sin_x, cos_x, sin_b, cos_b);
-        if cos_p <= 0.0 {
+        if cos_p <= self.cos_e {
             return 0.0;
         }
         let importance = self.phi * cos_p / distance2.max(radius2);

@@ -24,7 +24,9 @@ pub(crate) use self::fanlight::Fanlight;
 use crate::scenes::Scene;
 use crate::variance::BRIGHT;
 pub(crate) use arvo::{barycentrics, crosses};
+pub(crate) use binary_tree::BinaryTree;
 pub(crate) use discrete::Cumulative;
+pub(crate) use light_bounds::LightBounds;
 pub(crate) use triangle::OnTriangle;
 use triangle::{Choice, ThenPoint};
 
@@ -186,7 +188,7 @@ pub(crate) fn build<'a>(name: &str, scene: &'a Scene) -> Box<dyn Method + 'a> {
         }
         "uniform-area" => Box::new(ThenPoint::new(scene, triangle::best_choice(scene), OnTriangle::Area)),
         "talk-tree" => {
-            let binary = binary_tree::BinaryTree::new(&power::scene_bounds(scene));
+            let binary = BinaryTree::new(&power::scene_bounds(scene));
             let choice = Choice::Wide(wide_tree::WideTree::new(&binary));
             Box::new(ThenPoint::new(scene, choice, OnTriangle::SolidAngle))
         }
