@@ -80,6 +80,9 @@ impl<'a> LightSamplerView<'a> {
     /// Rays of light that leave the lights ([`Self::emission`]) are drawn as without a table, and [`Self::to_bytes`]
     /// writes the lights alone: a table has bytes of its own.
     ///
+    /// Distant lights have no factor: a [`DistantLight`](crate::DistantLight) keeps the weight that it has without a
+    /// table, whether walls hide it or not.
+    ///
     /// # Errors
     ///
     /// If the table was learned for a light tree with another number of nodes or of lights: after a rebuild, learn
@@ -192,8 +195,9 @@ impl VisibilityCounters {
     ///
     /// Report samples whether they got through or not, or only every nth of them; but do not choose by the result. For
     /// a sample on a portal, what counts is whether the environment is seen along its direction. `here` is the sampler
-    /// that drew the sample. Samples of lights that it does not have, and those at positions that are not finite, are
-    /// ignored, as are all of a sampler whose light tree has another number of nodes or of lights than the learner's.
+    /// that drew the sample. Samples of distant lights and of lights that it does not have, and those at positions that
+    /// are not finite, are ignored, as are all of a sampler whose light tree has another number of nodes or of lights
+    /// than the learner's.
     ///
     /// Where the sample got through several portals, what it says is shared among them: it counts most for the one that
     /// finds the direction most easily, since samples on the others are not needed for it.

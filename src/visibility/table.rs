@@ -80,7 +80,8 @@ impl VisibilityHeader {
 
 buffers! {
     /// What walls hide, as far as it has been learned: a factor for each child of a node of the light tree, by regions
-    /// of space and orientation. See [`LightSampler::with_visibility`](crate::LightSampler::with_visibility).
+    /// of space and orientation. See [`LightSampler::with_visibility`](crate::LightSampler::with_visibility). The regions
+    /// of an environment that is a light have factors as well; distant lights have none.
     ///
     /// A table is frozen: sampling reads it and never writes. It is made by [`Visibility::learn`](Self::learn), or by a
     /// [`VisibilityLearner`](crate::VisibilityLearner) from what a host reports while it renders.
