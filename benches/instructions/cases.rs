@@ -3,13 +3,14 @@
 use core::hint::black_box;
 
 use fanlight::{
-    Effort, Environment, Glossy, Hit, Instance, LightSample, LightSampler, LightSamplerBuilder, Mesh, MeshId, Receiver,
-    ShadingPoint, Splitting, Texture, TriangleId, Visibility, Weight,
+    Effort, Environment, Glossy, Hit, Instance, LightSample, LightSampler, LightSamplerBuilder, LightSamplerView, Mesh,
+    MeshId, Receiver, ShadingPoint, Splitting, Texture, TriangleId, Visibility, Weight,
 };
 use glam::{Affine3A, Quat, Vec3};
 use smallvec::SmallVec;
 
-use super::bulbs;
+use super::{building, bulbs};
+use crate::scenes::building::{FLOORS, MANY_FLOORS};
 use crate::scenes::pcg::Pcg32;
 use crate::scenes::{self, Scene};
 
@@ -70,6 +71,10 @@ pub(crate) const ALL: &[Case] = &[
     Case { name: "cornell/nee", calls: CALLS, run: cornell },
     Case { name: "bulbs/nee", calls: CALLS, run: bulbs::spheres },
     Case { name: "bulbs-triangles/nee", calls: CALLS, run: bulbs::triangles },
+    Case { name: "building/nee", calls: CALLS, run: || building::blind(FLOORS) },
+    Case { name: "building/learned-nee", calls: CALLS, run: || building::learned(FLOORS) },
+    Case { name: "building-10/nee", calls: CALLS, run: || building::blind(MANY_FLOORS) },
+    Case { name: "building-10/learned-nee", calls: CALLS, run: || building::learned(MANY_FLOORS) },
     Case { name: "quad/lobe-nee", calls: CALLS, run: || next_event_lobe("quad") },
     Case { name: "window/sample", calls: CALLS, run: || sample("window") },
     Case {
@@ -275,14 +280,19 @@ fn next_event_learned() {
     const RAYS: u64 = 100_000;
     let scene = scenes::scene("cloud-10000");
     let lights = lights(&scene);
-    let (points, numbers) = (lit_points(&scene, &lights), numbers());
+    let points = lit_points(&scene, &lights);
     let seen =
         |x: &ShadingPoint, sample: &LightSample| f32::from(u8::from((x.position.x < 0.5) == (sample.position.x < 0.5)));
     let point = |i: u64| points[i as usize % points.len()];
     let table = Visibility::learn(&lights.as_view(), RAYS, point, seen).expect("nobody cancels");
-    let learned = lights.with_visibility(&table).expect("it was learned for these lights");
+    next_event_of(&lights.with_visibility(&table).expect("it was learned for these lights"), &points);
+}
+
+/// What a host does at these points for one light sample.
+pub(super) fn next_event_of(lights: &LightSamplerView<'_>, points: &[ShadingPoint]) {
+    let numbers = numbers();
     measured(|i| {
-        let here = learned.at(&points[i]);
+        let here = lights.at(&points[i]);
         if let Some(sample) = here.sample(numbers[i]) {
             black_box(here.pdf_sample_direction(&sample));
             black_box(sample);

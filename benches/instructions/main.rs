@@ -4,6 +4,7 @@
 //! ```sh
 //! cargo bench -p fanlight-benches --bench instructions              # compares with the baseline, fails if any count grew by more than 5 %
 //! cargo bench -p fanlight-benches --bench instructions -- --update  # writes the baseline
+//! cargo bench -p fanlight-benches --bench instructions -- building  # only cases whose name contains the word
 //! ```
 //!
 //! Cases named `nee` are what a host does at a lit point: `at`, `sample`, and the density of the sampled direction.
@@ -11,6 +12,7 @@
 //!
 //! The program runs itself under Valgrind once for each case, and has what happens inside of [`measured`] counted.
 
+mod building;
 mod bulbs;
 mod cases;
 
@@ -53,8 +55,18 @@ fn run() -> Result<ExitCode, Error> {
         cases::ALL.iter().for_each(cases::Case::run);
         return Ok(ExitCode::SUCCESS);
     }
-    let counts: Counts =
-        cases::ALL.iter().map(|case| Ok((case.name.to_owned(), count(case)?))).collect::<Result<_, Error>>()?;
+    let word = words.iter().find(|word| !word.starts_with("--"));
+    let is_wanted = |case: &&cases::Case| word.is_none_or(|word| case.name.contains(word.as_str()));
+    let counts: Counts = cases::ALL
+        .iter()
+        .filter(is_wanted)
+        .map(|case| Ok((case.name.to_owned(), count(case)?)))
+        .collect::<Result<_, Error>>()?;
+    if let Some(word) = word {
+        counts.iter().for_each(|(name, count)| println!("{name:32} {count:>12}"));
+        let message = format!("no case is called anything with {word}");
+        return if counts.is_empty() { Err(message.into()) } else { Ok(ExitCode::SUCCESS) };
+    }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("instructions/baseline.txt");
     if words.iter().any(|word| word == "--update") {
         let lines: String = counts.iter().map(|(name, count)| format!("{name} {count}\n")).collect();
@@ -65,12 +77,22 @@ fn run() -> Result<ExitCode, Error> {
 
 /// Instructions a call.
 fn count(case: &cases::Case) -> Result<u64, Error> {
-    let output = Command::new("valgrind")
+    let mut valgrind = Command::new("valgrind");
+    valgrind
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*measured*"])
         .arg(std::env::current_exe()?)
-        .args([CASE, case.name])
+        .args([CASE, case.name]);
+    let table = std::env::temp_dir().join(format!("fanlight-table-{}", std::process::id()));
+    if let Some(bytes) = building::table(case.name) {
+        std::fs::write(&table, bytes)?;
+        valgrind.arg(building::TABLE).arg(&table);
+    }
+    let output = valgrind
         .output()
         .map_err(|error| format!("valgrind does not start ({error}): it has to be installed for this bench"))?;
+    if valgrind.get_args().any(|word| word == building::TABLE) {
+        std::fs::remove_file(&table)?;
+    }
     let text = String::from_utf8_lossy(&output.stderr);
     let collected = text.lines().find_map(|line| line.split("Collected : ").nth(1));
     let total: u64 = collected.ok_or_else(|| format!("{} ran into trouble:\n{text}", case.name))?.trim().parse()?;

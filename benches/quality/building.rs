@@ -15,6 +15,7 @@ use crate::args::Args;
 use crate::metrics;
 use crate::parallel::parallel;
 use crate::report::{self, Row};
+use crate::scenes::building::{self, HEIGHT, LightMesh, ROOMS, SIDE, is_door, sees};
 use crate::scenes::pcg::Pcg32;
 use crate::scenes::sky::{SUN_SAMPLE_SOLID_ANGLE, Sky};
 use crate::timing::{Nanoseconds, median};
@@ -23,10 +24,6 @@ use crate::timing::{Nanoseconds, median};
 pub(crate) const NAMES: [&str; 3] = ["building", "building-10", "building-windows"];
 const METHODS: [&str; 2] = ["fanlight", "fanlight@visibility"];
 
-/// Rooms along x and along y, and their sizes.
-const ROOMS: u32 = 6;
-const SIDE: f64 = 4.0;
-const HEIGHT: f64 = 3.0;
 /// Learning rays of the rows with visibility.
 const RAYS: [u64; 2] = [1_000_000, 10_000_000];
 /// Points a side of a window, and an edge of a lamp's triangle, over which variance is integrated.
@@ -43,13 +40,6 @@ struct Building {
     sky: Option<Sky>,
     meshes: Vec<LightMesh>,
     lights: LightSampler,
-}
-
-/// A mesh of the building.
-struct LightMesh {
-    positions: Vec<Vec3>,
-    indices: Vec<[u32; 3]>,
-    radiance: f32,
 }
 
 /// What was found at a point.
@@ -71,11 +61,11 @@ pub(crate) fn run(name: &str, args: &Args) -> Vec<Row> {
     let start = Instant::now();
     let building = match name {
         "building-windows" => Building::with_windows(),
-        "building-10" => Building::with_lamps(30),
-        _ => Building::with_lamps(3),
+        "building-10" => Building::with_lamps(building::MANY_FLOORS),
+        _ => Building::with_lamps(building::FLOORS),
     };
     let build_ms = start.elapsed().as_secs_f64() * 1e3;
-    let points = building.points(36, args.effort.points);
+    let points = building::points(building.floors, 36, args.effort.points);
     let mut rows = vec![];
     if wanted(METHODS[0]) {
         rows.push(building.row(name, None, &points, args, build_ms));
@@ -103,22 +93,12 @@ pub(crate) fn run(name: &str, args: &Args) -> Vec<Row> {
 
 impl Building {
     fn with_lamps(floors: u32) -> Self {
-        let mut pcg = Pcg32::new(35, 2);
-        let mut meshes = vec![];
-        for (i, j) in (0..ROOMS).flat_map(|i| (0..ROOMS).map(move |j| (i, j))) {
-            for k in 0..floors {
-                let x = (f64::from(i) + 0.3 + 0.4 * pcg.f()) * SIDE;
-                let y = (f64::from(j) + 0.3 + 0.4 * pcg.f()) * SIDE;
-                let radiance = (4.0 * pcg.f() - 2.0).exp2() as f32;
-                meshes.push(lamp(DVec3::new(x, y, HEIGHT * f64::from(k) + 2.6), radiance));
-            }
-        }
-        Self::new(floors, None, meshes)
+        Self::new(floors, None, building::lamps(floors))
     }
 
     fn with_windows() -> Self {
         let mut meshes = vec![];
-        for k in 0..3 {
+        for k in 0..building::FLOORS {
             for i in 0..ROOMS {
                 let [low, high] = [1.4, 2.6].map(|u| SIDE * f64::from(i) + u);
                 let [bottom, top] = [1.0, 2.2].map(|v| HEIGHT * f64::from(k) + v);
@@ -136,7 +116,7 @@ impl Building {
                 meshes.push(window(&|u, v| DVec3::new(u, end, v), false));
             }
         }
-        Self::new(3, Some(Sky::new()), meshes)
+        Self::new(building::FLOORS, Some(Sky::new()), meshes)
     }
 
     fn new(floors: u32, sky: Option<Sky>, meshes: Vec<LightMesh>) -> Self {
@@ -153,44 +133,9 @@ impl Building {
         Self { floors, sky, meshes, lights }
     }
 
-    /// Points alternately on floors and on the walls that look along x.
-    fn points(&self, seed: u64, count: usize) -> Vec<ShadingPoint> {
-        let mut pcg = Pcg32::new(seed, 2);
-        let mut points = vec![];
-        let mut is_floor = true;
-        while points.len() < count {
-            points.extend(self.point(&mut pcg, is_floor));
-            is_floor = !is_floor;
-        }
-        points
-    }
-
-    fn point(&self, pcg: &mut Pcg32, is_floor: bool) -> Option<ShadingPoint> {
-        let side = SIDE * f64::from(ROOMS);
-        let floor = |f: f64| HEIGHT * (f64::from(self.floors) * f).floor();
-        if is_floor {
-            let (x, y) = (side * pcg.f(), side * pcg.f());
-            let position = DVec3::new(x, y, floor(pcg.f()) + 0.001);
-            return Some(ShadingPoint::surface(position.as_vec3(), Vec3::Z));
-        }
-        let x = SIDE * (f64::from(ROOMS) * pcg.f()).floor() + 0.001;
-        let y = side * pcg.f();
-        let bottom = floor(pcg.f());
-        let position = DVec3::new(x, y, bottom + 0.3 + 2.4 * pcg.f());
-        let is_door = x > 1.0 && is_door(position.y, position.z);
-        (!is_door).then(|| ShadingPoint::surface(position.as_vec3(), Vec3::X))
-    }
-
     /// Learns visibility at random points like those of the workload.
     fn learn(&self, rays: u64) -> Visibility {
-        let points = |i: u64| {
-            let mut pcg = Pcg32::new(i, 41);
-            loop {
-                if let Some(point) = self.point(&mut pcg, i.is_multiple_of(2)) {
-                    return point;
-                }
-            }
-        };
+        let points = |i: u64| building::learning_point(self.floors, i);
         let seen = |x: &ShadingPoint, sample: &LightSample| f32::from(u8::from(sees(x, sample.position.as_dvec3())));
         Visibility::learn(&self.lights.as_view(), rays, points, seen).expect("nobody cancels")
     }
@@ -381,57 +326,4 @@ impl Building {
         let call = median(calls);
         Nanoseconds { lit: call, all: call, pdf: median(pdfs) }
     }
-}
-
-/// A sphere of 6 x 6 quads of longitude and latitude.
-fn lamp(center: DVec3, radiance: f32) -> LightMesh {
-    const N: u32 = 6;
-    const RADIUS: f64 = 0.15;
-    let angle = |i: u32, turn: f64| turn * f64::from(i) / f64::from(N);
-    let position = |i: u32, j: u32| {
-        let (sin_phi, cos_phi) = angle(i, core::f64::consts::TAU).sin_cos();
-        let (sin, cos) = angle(j, core::f64::consts::PI).sin_cos();
-        (center + RADIUS * DVec3::new(sin * cos_phi, sin * sin_phi, cos)).as_vec3()
-    };
-    let positions = (0..=N).flat_map(|j| (0..=N).map(move |i| position(i, j))).collect();
-    let mut indices = vec![];
-    for (i, j) in (0..N).flat_map(|j| (0..N).map(move |i| (i, j))) {
-        let at = |i: u32, j: u32| j * (N + 1) + i;
-        if j > 0 {
-            indices.push([at(i, j), at(i, j + 1), at(i + 1, j)]);
-        }
-        if j + 1 < N {
-            indices.push([at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)]);
-        }
-    }
-    LightMesh { positions, indices, radiance }
-}
-
-/// Whether a place of an inner wall is in a door.
-fn is_door(along: f64, z: f64) -> bool {
-    (along.rem_euclid(SIDE) - 2.0).abs() < 0.5 && z.rem_euclid(HEIGHT) < 2.0
-}
-
-/// Whether nothing but doors is between a shading point and a point.
-fn sees(x: &ShadingPoint, to: DVec3) -> bool {
-    let from = x.position.as_dvec3();
-    if (from.z / HEIGHT).floor() != (to.z / HEIGHT).floor() {
-        return false;
-    }
-    for axis in 0..2 {
-        let (low, high) = if from[axis] < to[axis] { (from[axis], to[axis]) } else { (to[axis], from[axis]) };
-        let mut wall = (low / SIDE).ceil();
-        while wall * SIDE < high {
-            let plane = wall * SIDE;
-            if wall > 0.0 && wall < f64::from(ROOMS) {
-                let t = (plane - from[axis]) / (to[axis] - from[axis]);
-                let place = from + (to - from) * t;
-                if !is_door(place[1 - axis], place.z) {
-                    return false;
-                }
-            }
-            wall += 1.0;
-        }
-    }
-    true
 }

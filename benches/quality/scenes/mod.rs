@@ -1,5 +1,6 @@
 //! The workloads: geometry, textures, environment and shading points, all from fixed seeds.
 
+pub(crate) mod building;
 pub(crate) mod cloud;
 pub(crate) mod image;
 pub(crate) mod openings;
