@@ -278,6 +278,21 @@ macro_rules! buffers {
 
 pub(crate) use buffers;
 
+/// Implements `Debug` of a large structure by what is worth a line of a log: counts, sizes and single numbers.
+macro_rules! debug_counts {
+    ($name:ident$(<$lifetime:lifetime>)?, $this:ident => { $($field:ident: $value:expr),* $(,)? }) => {
+        impl core::fmt::Debug for $name$(<$lifetime>)? {
+            /// Shows counts and sizes, not contents.
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                let $this = self;
+                f.debug_struct(stringify!($name))$(.field(stringify!($field), &$value))*.finish()
+            }
+        }
+    };
+}
+
+pub(crate) use debug_counts;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -36,7 +36,7 @@ pub(super) enum Edges {
 /// let environment = Environment::new(&image)?;
 /// # Ok::<(), fanlight::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 #[must_use]
 pub struct EnvironmentImage<'a> {
     pub(super) width: usize,
@@ -47,6 +47,14 @@ pub struct EnvironmentImage<'a> {
     /// Texels a side of the resampled image, if the host chose them.
     pub(super) resolution: Option<usize>,
 }
+
+crate::buffers::debug_counts!(EnvironmentImage<'_>, image => {
+    width: image.width,
+    height: image.height,
+    edges: image.edges,
+    filter: image.filter,
+    resolution: image.resolution,
+});
 
 impl<'a> EnvironmentImage<'a> {
     /// A latitude-longitude image of `width * height` texels, the top row first.

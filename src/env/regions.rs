@@ -60,7 +60,7 @@ const LEAST_SPREAD: f32 = 0.005;
 /// What each region sends, by arrays that a loop over all regions reads as vectors. Directions are those of the
 /// environment's frame, so that a rotation changes nothing.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct RegionMoments {
     /// Components of the unit direction in which the light of a region is centered.
     pub(crate) axes: [[f32; REGIONS]; 3],
@@ -73,6 +73,11 @@ pub(crate) struct RegionMoments {
     /// Weight that the region keeps wherever the cone is not below the horizon. Positive where the flux is.
     pub(crate) least: [f32; REGIONS],
 }
+
+crate::buffers::debug_counts!(RegionMoments, moments => {
+    regions: moments.flux.len(),
+    lit: moments.flux.iter().filter(|flux| **flux > 0.0).count(),
+});
 
 const _: () = assert!(size_of::<RegionMoments>() == 1792);
 
@@ -134,7 +139,7 @@ impl RegionMoments {
         Vec3::from_array(self.axes.map(|axis| axis[region]))
     }
 
-    /// Checks that no sum or product of sampling can be anything but finite.
+    /// Checks that all sums and products of sampling are finite.
     ///
     /// # Errors
     ///
@@ -210,13 +215,17 @@ fn center(depth: u32, [x, y]: [u32; 2]) -> Vec3 {
 }
 
 /// Weights of all regions, and their sums over each column of the square that they form.
-#[derive(Debug)]
 pub(crate) struct RegionSums {
     weights: [f32; REGIONS],
     /// Sums of columns rather than rows: a sum of rows is a sum of vectors.
     columns: [f32; REGIONS_A_SIDE],
     total: f32,
 }
+
+crate::buffers::debug_counts!(RegionSums, sums => {
+    regions: sums.weights.len(),
+    total: sums.total,
+});
 
 impl RegionSums {
     /// No weight at all.

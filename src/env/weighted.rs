@@ -29,13 +29,18 @@ const REGION_REACH: f32 = 1.1;
 
 /// A distribution of directions: the environment's, with another weight for each of up to 256 regions of equal solid
 /// angle.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct DirectionDistribution {
     /// Mean radiance times weight of the regions, then sums over four regions of a finer level, laid out as the
     /// levels of a pyramid.
     sums: [f32; WEIGHTED_REGIONS],
     depth: u32,
 }
+
+crate::buffers::debug_counts!(DirectionDistribution, distribution => {
+    depth: distribution.depth,
+    sums: distribution.sums.len(),
+});
 
 impl DirectionDistribution {
     /// Weighs every region that is not black by a function of its central world direction and the angle around

@@ -36,7 +36,7 @@ const MOST_ANGLES: usize = 2048;
 /// assert!(lights.at(&ShadingPoint::surface(Vec3::new(9.0, 0.0, 0.0), Vec3::Z)).sample([0.5; 3]).is_none());
 /// # Ok::<(), fanlight::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[must_use]
 pub struct Profile<'a> {
     /// Angles from the axis in radians, at least two: from 0 to π, in ascending order. Nothing is sent before the first
@@ -49,6 +49,12 @@ pub struct Profile<'a> {
     /// next.
     pub intensities: &'a [f32],
 }
+
+crate::buffers::debug_counts!(Profile<'_>, profile => {
+    vertical: profile.vertical.len(),
+    horizontal: profile.horizontal.len(),
+    intensities: profile.intensities.len(),
+});
 
 impl Profile<'_> {
     /// Returns the intensity at a vertical and a horizontal angle, in radians.

@@ -53,7 +53,7 @@ const TANGENTS: [f32; 2] = [4e-4, 49.0];
 /// assert!(on_screen(2.0).is_none());
 /// # Ok::<(), fanlight::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[must_use]
 pub struct Projection<'a> {
     /// Angles of view across the image and down, in radians: the whole angles, from 1e-3 to 3.1.
@@ -65,6 +65,13 @@ pub struct Projection<'a> {
     /// How the host reads the image between texel centers. Beyond the centers at the edges it is constant.
     pub filter: Filter,
 }
+
+crate::buffers::debug_counts!(Projection<'_>, projection => {
+    angles: projection.angles,
+    size: projection.size,
+    intensities: projection.intensities.len(),
+    filter: projection.filter,
+});
 
 impl Projection<'_> {
     /// Returns the intensity at a point of the image, from `[0, 0]` at the upper left to `[1, 1]` at the lower right;

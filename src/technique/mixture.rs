@@ -18,8 +18,8 @@ use crate::warp::{Variate, pick_pair};
 /// outshines the rest; a smaller one makes fireflies where the estimate of the rest is too low.
 const LEAST_TREES: f32 = 0.02;
 
-/// The same next to a portal: what is seen through it differs so much from place to place that neither the estimate of
-/// the trees nor their choices are as good there.
+/// Least probability of the trees next to the features, where the shading point is close to a portal: what is seen
+/// through it differs from place to place, so that the estimate of the trees and their choices are worse there.
 ///
 /// Measured on star (docs/ACCURACY.md, "Where it is still weak"): without it one point 6 mm from the card has 21 times
 /// the variance; everywhere, a tenth costs the window with sun 20 times its variance.
@@ -43,7 +43,6 @@ fn share_beside(own: f64, others: f64) -> f64 {
 }
 
 /// The techniques at one shading point, as far as they have been found out once for all questions.
-#[derive(Debug)]
 pub(crate) struct Mixture {
     /// Weights of the tree's first choice, where balancing the techniques has taken them.
     first: Option<FirstWeights>,
@@ -59,6 +58,16 @@ pub(crate) struct Mixture {
     /// Whether all of this is known, and not only that there are trees.
     is_complete: bool,
 }
+
+crate::buffers::debug_counts!(Mixture, mixture => {
+    first: mixture.first.is_some(),
+    features: mixture.features,
+    rest: mixture.rest,
+    sky: mixture.sky.is_some(),
+    distant: mixture.distant,
+    shares: mixture.shares,
+    is_complete: mixture.is_complete,
+});
 
 /// What each unit of a technique's [`total`](Technique::total) counts.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +86,7 @@ struct Shares {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drawn {
     pub(crate) point: LightPoint,
-    /// The same relative to the shading point.
+    /// Position of the point relative to the shading point.
     pub(crate) relative: DVec3,
     /// Probability of the light by the trees, or the expected number of visits where the tree is split.
     pub(crate) pmf: f64,

@@ -58,7 +58,7 @@ pub(crate) struct MediumSegment {
 }
 
 /// Densities of distances along a segment.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct Distances {
     segment: MediumSegment,
     clusters: Clusters,
@@ -71,6 +71,13 @@ pub(crate) struct Distances {
     /// Probabilities of the clusters, the beams and the even share.
     shares: [f32; 3],
 }
+
+crate::buffers::debug_counts!(Distances, distances => {
+    segment: distances.segment,
+    sum: distances.sum,
+    beams: distances.beams,
+    shares: distances.shares,
+});
 
 impl MediumSegment {
     fn length(&self) -> f64 {

@@ -64,12 +64,17 @@ impl Record {
 }
 
 /// A collection of reports.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Default, PartialEq)]
 pub(crate) struct Counts {
     /// Up to `sorted`, in order and one for each key; then as they came.
     records: Vec<Record>,
     sorted: usize,
 }
+
+crate::buffers::debug_counts!(Counts, counts => {
+    records: counts.records.len(),
+    sorted: counts.sorted,
+});
 
 impl Counts {
     /// Least number of records that are sorted. *Chosen*: a few pages.

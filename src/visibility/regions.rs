@@ -46,7 +46,7 @@ impl RegionExtent {
 }
 
 /// The regions as they grow.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct RegionBuilder {
     nodes: Vec<RegionNode>,
     /// Node of each region.
@@ -56,6 +56,11 @@ pub(crate) struct RegionBuilder {
     /// Where all reports of an orientation are.
     around: [RegionExtent; ORIENTATIONS],
 }
+
+crate::buffers::debug_counts!(RegionBuilder, regions => {
+    nodes: regions.nodes.len(),
+    regions: regions.leaves.len(),
+});
 
 impl RegionBuilder {
     /// Returns one region for each orientation.

@@ -105,11 +105,15 @@ buffers! {
 }
 
 /// The entries of one region.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct RegionFactors<'a> {
     keys: &'a [u32],
     factors: &'a [Factors],
 }
+
+crate::buffers::debug_counts!(RegionFactors<'_>, region => {
+    entries: region.keys.len(),
+});
 
 impl<'a> RegionFactors<'a> {
     /// Returns the factors of a node, or of another key.

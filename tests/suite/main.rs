@@ -14,6 +14,7 @@ mod agreement;
 mod build;
 mod chi_square;
 mod circles;
+mod debug;
 mod distant;
 mod docs;
 mod double_check;

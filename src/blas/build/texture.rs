@@ -17,7 +17,7 @@ pub(crate) const MAX_TEXTURE_SIDE: usize = 1 << 15;
 /// Texture coordinates outside of `[0, 1]` repeat the image if it wraps so. The trees over it do not grow with the
 /// number of copies: a triangle takes no more than 64 kB, or half a byte a texel if that is more, besides the 256 kB
 /// that all triangles of a small image share. For a weight without an image see [`Procedural`](crate::Procedural).
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 #[must_use]
 pub struct Texture<'a> {
     width: u32,
@@ -26,6 +26,13 @@ pub struct Texture<'a> {
     filter: Filter,
     wrap: [Wrap; 2],
 }
+
+crate::buffers::debug_counts!(Texture<'_>, texture => {
+    width: texture.width,
+    height: texture.height,
+    filter: texture.filter,
+    wrap: texture.wrap,
+});
 
 impl<'a> Texture<'a> {
     /// An image of finite texels that are not negative, with bilinear lookup that repeats along both axes.

@@ -50,13 +50,18 @@ pub(crate) struct EditState {
 }
 
 /// What a sampler holds only for edits to come.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Unplaced {
     /// Words of the objects while there is no instance.
     objects: Vec<u32>,
     /// Light groups of lamps that emit nothing, but for those in all groups.
     lamps: BTreeMap<u32, u32>,
 }
+
+crate::buffers::debug_counts!(Unplaced, unplaced => {
+    objects: unplaced.objects.len(),
+    lamps: unplaced.lamps.len(),
+});
 
 impl Unplaced {
     /// Takes from a collection what will not be in its sampler.
@@ -70,7 +75,7 @@ impl Unplaced {
 }
 
 /// What edits of lights need to know beside them.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 struct LightsState {
     lamps: Numbers,
     meshes: Numbers,
@@ -85,6 +90,17 @@ struct LightsState {
     /// Nodes of trees over textures when those that nothing refers to were removed last.
     cells: usize,
 }
+
+crate::buffers::debug_counts!(LightsState, state => {
+    lamps: state.lamps,
+    meshes: state.meshes,
+    instances: state.instances,
+    free_meshes: state.free_meshes.values().map(Vec::len).sum::<usize>(),
+    mesh_sizes: state.mesh_sizes.len(),
+    objects: state.objects.len(),
+    unplaced: state.unplaced,
+    cells: state.cells,
+});
 
 impl EditState {
     /// Returns the number of bytes that this takes, but for what was removed or is dark.

@@ -3,11 +3,16 @@
 use alloc::collections::BTreeSet;
 
 /// Numbers from 0 on, some of which are free.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct Numbers {
     count: u32,
     free: BTreeSet<u32>,
 }
+
+crate::buffers::debug_counts!(Numbers, numbers => {
+    count: numbers.count,
+    free: numbers.free.len(),
+});
 
 impl Numbers {
     /// Returns the numbers below `count`, all in use.

@@ -28,7 +28,7 @@ pub(super) struct VisibleFeature {
 }
 
 /// Features through parts of portals. Written only as far as it is used: most points see few.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(crate) struct VisibleFeatures {
     /// Never more than there is room for.
     visible: SmallVec<[VisibleFeature; MAX_VISIBLE]>,
@@ -37,6 +37,11 @@ pub(crate) struct VisibleFeatures {
     /// Whether the shading point is close to one of the portals.
     is_close: bool,
 }
+
+crate::buffers::debug_counts!(VisibleFeatures, features => {
+    visible: features.visible.len(),
+    is_close: features.is_close,
+});
 
 impl VisibleFeatures {
     /// Irradiances from all that is listed.

@@ -5,12 +5,16 @@ use alloc::vec::Vec;
 use crate::tlas::arity::MAX_LANES;
 
 /// Free places of an array, in blocks of neighbors that are as long as the children of a node may be.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(super) struct FreeBlocks {
     /// First places of the blocks, by their lengths less one.
     by_length: [Vec<u32>; MAX_LANES],
     count: usize,
 }
+
+crate::buffers::debug_counts!(FreeBlocks, blocks => {
+    count: blocks.count,
+});
 
 impl FreeBlocks {
     /// Returns the number of all free places.

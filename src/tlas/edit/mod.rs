@@ -48,7 +48,7 @@ const LEAST_EDITS: u32 = 32;
 /// Depth from which on a new leaf looks for a subtree above it that is to be built again, without waiting for the end
 /// of the batch. *Chosen*: more than twice the depth of a built tree of a million lights.
 ///
-/// Larger: long batches of lights at one place take longer. Smaller: deep trees are searched in vain.
+/// Larger: long batches of lights at one place take longer. Smaller: searches of deep trees find nothing.
 const DEEP: usize = 32;
 
 /// Free places, relative to those in use, above which a tree is laid out again. *Chosen* as a bound of the memory.
@@ -84,12 +84,18 @@ pub(crate) trait LeafStore {
 }
 
 /// What edits of a tree need to know beside it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(crate) struct TreeState {
     nodes: Vec<NodeState>,
     free_nodes: FreeBlocks,
     free_leaves: FreeBlocks,
 }
+
+crate::buffers::debug_counts!(TreeState, state => {
+    nodes: state.nodes.len(),
+    free_nodes: state.free_nodes.count(),
+    free_leaves: state.free_leaves.count(),
+});
 
 impl TreeState {
     /// Returns the number of bytes that this takes.
