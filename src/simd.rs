@@ -1,4 +1,4 @@
-//! The same code compiled for wider vector registers, chosen when the program runs.
+//! Code compiled for several widths of vector registers, of which one is chosen when the program runs.
 //!
 //! A [`Kernel`] is plain code over arrays, which a compiler turns into vectors of the width that it may use. Products
 //! and sums are never fused, so that all instruction sets give the same bits.

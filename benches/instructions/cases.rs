@@ -183,7 +183,7 @@ fn numbers() -> Vec<[f32; 3]> {
 /// Roughness of the lobes.
 const ROUGHNESS: f32 = 0.1;
 
-/// The same points as glossy surfaces, seen from directions above them.
+/// Returns the points as glossy surfaces, seen from directions above them.
 fn with_lobes(points: Vec<ShadingPoint>) -> Vec<ShadingPoint> {
     let mut pcg = Pcg32::new(34, 2);
     let with_lobe = |x: ShadingPoint| {
@@ -253,7 +253,7 @@ fn next_event(workload: &str) {
     next_event_at(workload, |points| points);
 }
 
-/// The same with the least effort.
+/// What a host does at a lit point for one light sample with the least effort.
 fn next_event_least(workload: &str) {
     next_event_at(workload, |points| points.into_iter().map(|x| x.with_effort(Effort::Least)).collect());
 }
@@ -275,7 +275,7 @@ fn next_event_at(workload: &str, change: fn(Vec<ShadingPoint>) -> Vec<ShadingPoi
     });
 }
 
-/// The same with a table of what a wall through the middle of the cloud hides.
+/// What a host does at a lit point, with a table of what a wall through the middle of the cloud hides.
 fn next_event_learned() {
     const RAYS: u64 = 100_000;
     let scene = scenes::scene("cloud-10000");
@@ -387,7 +387,7 @@ fn star_instances(count: u32) {
     star_wall(count, true);
 }
 
-/// The same with the windows as meshes of their own.
+/// The windows of [`star_instances`] as meshes of their own.
 fn star_flattened(count: u32) {
     star_wall(count, false);
 }
@@ -441,7 +441,7 @@ enum Street {
     Flattened,
     /// Those of [`Street::Instances`], each of which goes by a little while the shutter is open.
     Moving,
-    /// The same as a mesh each.
+    /// The lamps of [`Street::Moving`] as a mesh each.
     MovingTriangles,
 }
 

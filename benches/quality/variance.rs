@@ -126,7 +126,7 @@ impl Estimator<'_> {
         self.scene.sky.as_ref().is_some_and(|sky| sky.environment.radiance(drawn.direction) > BRIGHT)
     }
 
-    /// The same integral over the visible part of the sun, by quadrature.
+    /// Integral of `(f/p - E)² p` over the visible part of the sun, by quadrature.
     fn sun(&self, sky: &Sky, x: &ShadingPoint, irradiance: f64) -> f64 {
         let solid_angle = SUN_SAMPLE_SOLID_ANGLE * SUN_STRIDE as f64;
         let term = |&(direction, _): &(DVec3, f64)| {

@@ -89,7 +89,7 @@ mod tests {
         nodes
     }
 
-    /// The same with one byte of the first node changed.
+    /// Returns a [`chain`] with one byte of the first node changed.
     fn changed(n: usize, at: usize, value: u8) -> Vec<CellNode> {
         let mut nodes = chain(n);
         bytemuck::cast_slice_mut(&mut nodes)[at] = value;

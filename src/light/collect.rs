@@ -48,7 +48,7 @@ pub(crate) struct LightCollection<'a> {
     /// Light groups of each.
     pub(super) lamp_groups: Vec<u32>,
     profiles: ProfileCollection,
-    /// The same as lights need them. Complete after [`Self::build_images`].
+    /// Profiles and motion as lights read them. Complete after [`Self::build_images`].
     packed: Vec<u32>,
     /// Light groups of the environment.
     pub(crate) environment_groups: u32,

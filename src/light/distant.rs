@@ -260,7 +260,7 @@ pub(super) fn arrange(lights: &mut [DistantRecord]) -> Vec<DistantGroup> {
         let place = |light: &DistantRecord| {
             let square = sphere_to_square(-light.axis()) * SORTING_STEPS;
             let [x, y] = [square.x as u32, square.y as u32];
-            // Along a curve that fills the square: the bits of both take turns.
+            // Along a curve that fills the square: the bits of both are interleaved.
             (0..11).fold(0, |code, bit| code | (x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1))
         };
         lights.sort_by_key(|light| (place(light), light.number));

@@ -219,7 +219,7 @@ fn environment_samples_have_the_density_that_pdf_finds() {
     }
 }
 
-/// The same bits from a second build, and from a sampler that went through bytes and draws many at once.
+/// A second build gives the same bits, and so does a sampler that went through bytes and draws many at once.
 #[test]
 fn samples_are_reproducible_to_the_bit() {
     let bits = |sample: &Option<LightSample>| {

@@ -55,7 +55,7 @@ fn power(scene: &Scene) -> f64 {
     irradiance.sum::<f64>() / f64::from(GRID * GRID) * f64::from(side * side)
 }
 
-/// The same by photons, with its standard error.
+/// Power that the lights send to the floor, by photons, with its standard error.
 fn photon_power(scene: &Scene, emission: &Emission<'_>, pcg: &mut Pcg32) -> Mean {
     let mut mean = Mean::default();
     for _ in 0..SAMPLES {

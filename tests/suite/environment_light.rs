@@ -65,7 +65,7 @@ fn points(count: usize, sequence: u64) -> Vec<ShadingPoint> {
     (0..count).map(point).collect()
 }
 
-/// The same points with lobes.
+/// Shading points with lobes near the origin.
 fn points_with_lobes(count: usize, sequence: u64) -> Vec<ShadingPoint> {
     let mut pcg = Pcg32::new(18, sequence);
     points(count, sequence).into_iter().map(|x| with_lobe(x, &mut pcg, 0.1)).collect()

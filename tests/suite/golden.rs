@@ -44,7 +44,7 @@ const PROJECTIONS: usize = 6;
 /// Scenes that are edited.
 const EDITED: usize = 12;
 
-/// The same scenes at points with lobes.
+/// List of the scenes at points with lobes.
 const LOBES: &str = if cfg!(feature = "std") { "lobes-std.txt" } else { "lobes-libm.txt" };
 
 /// FNV-1a over the bits of numbers.

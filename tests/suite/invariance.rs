@@ -14,7 +14,7 @@ const SCENES: usize = 24;
 /// Cosines at either end below which rounding decides whether anything arrives.
 const GRAZING: f64 = 1e-3;
 
-/// The same scene and shading point, written down in another way.
+/// A scene and a shading point, written down in another way.
 struct Changed {
     scene: Scene,
     x: ShadingPoint,

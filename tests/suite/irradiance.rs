@@ -375,7 +375,7 @@ fn nested_portals() {
     assert_unbiased(&Case { name: "nested portals", scene: nested, integral: through_outermost, estimator });
 }
 
-/// The same check fails for the density of the point alone: it is the check of the density of a direction.
+/// For the density of the point alone the check fails: what it checks is the density of a direction.
 #[test]
 fn nested_portals_need_the_density_of_the_direction() {
     let estimator = Estimator::DirectionByPoint;

@@ -289,7 +289,7 @@ fn disks_are_seen_from_their_axis() {
     }
 }
 
-/// Of lamps behind each other, each candidate stands for its own lamp.
+/// Where lamps are behind each other, each candidate stands for its own lamp.
 #[test]
 fn resampled_lamps_bring_what_samples_bring() {
     let mut pcg = Pcg32::new(7, 146);

@@ -161,7 +161,7 @@ fn where_all_is_visible_the_density_of_many_textures_integrates_to_one() {
     check_where_all_is_visible(true);
 }
 
-/// The same far from the origin, tiny, huge, and squeezed to slivers.
+/// Scenes far from the origin, tiny, huge, and squeezed to slivers.
 #[test]
 fn the_density_integrates_to_one_at_any_scale() {
     let changes: [&(dyn Fn(Vec3) -> Vec3 + Sync); 6] = [

@@ -35,7 +35,7 @@ enum Wall {
     Nested,
     /// This many holes a side, each of half the pitch.
     Holes(i32),
-    /// The same as a window with a clip map.
+    /// This many holes a side, by the clip map of a window.
     Clipped(i32),
 }
 
@@ -197,7 +197,7 @@ fn a_second_window_behind_the_first_changes_nothing() {
     check_irradiance(Wall::Nested, 0.5);
 }
 
-/// Of a sun that is drawn as if there were no wall, three of four directions would be lost here: a variance of 3.
+/// If a sun were drawn as if there were no wall, three of four directions would be lost here: a variance of 3.
 #[test]
 fn openings_as_small_as_the_sun() {
     check_irradiance(Wall::Holes(20), 0.5);

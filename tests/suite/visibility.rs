@@ -43,7 +43,7 @@ fn learn(lights: &LightSampler, rays: u64) -> Visibility {
     Visibility::learn(&lights.as_view(), rays, point, wall).expect("nobody cancels")
 }
 
-/// The same table with other factors: they are the last section.
+/// Returns the table with other factors: they are the last section.
 fn with_factors(visibility: &Visibility, kind: Hostile, pcg: &mut Pcg32) -> Visibility {
     let mut bytes = visibility.to_bytes();
     let count = 16 * entries(visibility);

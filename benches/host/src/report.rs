@@ -65,7 +65,7 @@ impl Report {
 
     /// Notes a scene whose data is missing.
     pub(crate) fn skip(&mut self, scene: &str, file: &Path) {
-        eprintln!("skipped: {scene}, for want of {}", file.display());
+        eprintln!("skipped: {scene}, because {} is missing", file.display());
         self.skipped.push((scene.to_owned(), file.to_owned()));
     }
 

@@ -57,7 +57,7 @@ pub(crate) struct Panel {
 pub(crate) struct Panels {
     pub(crate) panels: Vec<Panel>,
     pub(crate) columns: usize,
-    /// Of the horizontal and the vertical axis.
+    /// Labels of the horizontal and the vertical axis.
     pub(crate) labels: [&'static str; 2],
     pub(crate) style: Style,
     /// All names there are, in the order of their colors; those that appear in no panel are left out of the legend.

@@ -56,7 +56,7 @@ impl Image {
         Self::from_fn(64, Filter::Bilinear, 0.0, |uv| (wave(uv.x) * wave(uv.y)) as f32)
     }
 
-    /// The same for the crate.
+    /// Returns the image as a texture of the crate.
     pub(crate) fn texture(&self) -> Texture<'_> {
         let texture = Texture::new(self.size, self.size, &self.texels).expect("the image is finite");
         texture.filter(self.filter).wrap(Wrap::Clamp, Wrap::Clamp)

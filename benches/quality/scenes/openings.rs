@@ -26,7 +26,7 @@ pub(crate) fn grid(k: usize) -> Scene {
     Scene::portals(vec![wall(2.0, Opening::Grid(k))], None)
 }
 
-/// The same as one square with a clip map.
+/// The openings of [`grid`] as one square with a clip map.
 pub(crate) fn grid_clip(k: usize) -> Scene {
     let wall = wall(2.0, Opening::Clipped);
     Scene::portals(vec![wall], Some(Image::grid(k)))

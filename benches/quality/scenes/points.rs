@@ -10,7 +10,7 @@ use super::pcg::Pcg32;
 pub(crate) enum PointSet {
     /// In and around the unit cube.
     Cube,
-    /// The same, but outside of the bumpy sphere.
+    /// In and around the unit cube, but outside of the bumpy sphere.
     AroundSphere,
     /// Above and below the horizon of the unit square.
     OverQuad,

@@ -29,7 +29,7 @@ impl Sky {
         Self::with_sun(is_sun)
     }
 
-    /// The same sky at another time.
+    /// Returns the sky of the workloads without its sun.
     pub(crate) fn without_sun() -> Self {
         Self::with_sun(|_| false)
     }

@@ -37,7 +37,7 @@ impl Wall {
         self.at((DVec2::new(hit.x, hit.z) - self.min) / self.side, image)
     }
 
-    /// The same for a place of the rectangle, in units of its side.
+    /// Triangle and transmittance at a place of the rectangle, in units of its side.
     fn at(&self, place: DVec2, image: Option<&Image>) -> Option<(usize, f64)> {
         if !(0.0..1.0).contains(&place.x) || !(0.0..1.0).contains(&place.y) {
             return None;

@@ -28,7 +28,7 @@ const WORKLOADS: [(&str, &str, &[f64], &[f64]); 3] = [
     ("window", "lobe-window", &[0.05, 0.1, 0.2, 0.4], &[0.0]),
     ("quad", "lobe-quad", &[0.05, 0.1, 0.2, 0.4], &[0.0]),
 ];
-/// The same with other microfacets: scene, name, roughness along the tangent and across, and what is transmitted.
+/// Workloads with microfacets: scene, name, roughness along the tangent and across, and what is transmitted.
 const MICROFACETS: [(&str, &str, [f64; 2], f64); 6] = [
     ("cloud-10000", "lobe-brushed-0.05-0.2", [0.05, 0.2], 0.0),
     ("cloud-10000", "lobe-brushed-0.1-0.4", [0.1, 0.4], 0.0),
@@ -296,7 +296,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// Of the estimates by one kind of samples.
+/// Count and sums of the estimates by one kind of samples.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     count: f64,

@@ -76,7 +76,7 @@ fn variances(case: &Case, points: &[ShadingPoint], input: Input, repetitions: u6
     })
 }
 
-/// Of the line through the logarithms (least squares).
+/// Slope of the line through the logarithms (least squares).
 fn slope(variances: &[f64; 4]) -> f64 {
     let marks: Vec<(f64, f64)> = COUNTS.iter().zip(variances).map(|(n, v)| (f64::from(*n).ln(), v.ln())).collect();
     let mean = |get: fn(&(f64, f64)) -> f64| marks.iter().map(get).sum::<f64>() / marks.len() as f64;

@@ -199,7 +199,7 @@ pub(super) struct SparsePart {
     pub(super) buffer_view: usize,
     #[serde(default)]
     pub(super) byte_offset: usize,
-    /// Of the indices alone; the values are of the accessor's type.
+    /// Type of the indices; the values are of the accessor's type.
     #[serde(default)]
     pub(super) component_type: u32,
 }

@@ -21,7 +21,7 @@ use crate::render::{Camera, Copies, Error, Lobe, Material, Mesh, Model, Sky};
 
 /// Longest side of a scene: what is further than a thousand kilometers is a mistake in its units.
 const LARGEST: f32 = 1e6;
-/// And the shortest.
+/// Shortest size of a scene.
 const SMALLEST: f32 = 1e-3;
 
 /// A scene, and what should be known of it.
@@ -38,7 +38,7 @@ pub(crate) struct Read {
 pub(crate) struct Prefixes<'a> {
     /// Those whose names start with this are portals, if they let light through.
     pub(crate) portals: &'a str,
-    /// And those whose names start with this do so, as clear panes, whatever the file says.
+    /// Those whose names start with this are portals as well, as clear panes, whatever the file says.
     pub(crate) panes: Option<&'a str>,
 }
 
@@ -101,7 +101,7 @@ struct Reader<'a> {
     objects: HashMap<(usize, usize), Arc<Mesh>>,
     /// Triangles or vertices so far.
     size: usize,
-    /// Of each material that is in use; the last one is that of meshes without a material.
+    /// Mappings of each material that is in use; the last one is that of meshes without a material.
     mappings: Vec<Option<Mappings>>,
     model: Model,
     notes: Notes,

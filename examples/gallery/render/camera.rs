@@ -29,12 +29,12 @@ impl Camera {
         Self { width: 208, height: 156, position, axes, field_of_view, parallel: None }
     }
 
-    /// The same with parallel rays, which see this height.
+    /// Returns the camera with parallel rays, which see this height.
     pub(crate) const fn parallel(self, height: f32) -> Self {
         Self { parallel: Some(height), ..self }
     }
 
-    /// The same with another number of pixels.
+    /// Returns the camera with another number of pixels.
     pub(crate) const fn sized(self, [width, height]: [u32; 2]) -> Self {
         Self { width, height, ..self }
     }

@@ -103,7 +103,7 @@ impl Lamp {
 }
 
 impl Diagram {
-    /// The same as a table of `fanlight`'s.
+    /// Returns the diagram as a profile of `fanlight`.
     pub(super) fn profile(&self) -> Profile<'_> {
         Profile { vertical: &self.vertical, horizontal: &self.horizontal, intensities: &self.intensities }
     }

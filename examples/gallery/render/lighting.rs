@@ -70,7 +70,7 @@ impl Lights {
         Self::build(model, illumination, false)
     }
 
-    /// The same with the sky as one more light where no portal leads to it.
+    /// Passes in all that emits light or lets it in, and the sky as one more light where no portal leads to it.
     pub(crate) fn plain(model: &Model) -> Result<Self, Error> {
         let is_portal = |mesh: &super::mesh::Mesh| model.is_portal(mesh) && model.materials[mesh.material].has_holes();
         let open_sky = model.sky.is_some() && !model.meshes.iter().any(is_portal);
@@ -131,12 +131,12 @@ impl Lights {
         Ok(Self { sources, passed, knows_hits, open_sky, sampler, tells_lobes: true, visibility: None })
     }
 
-    /// The same with every surface taken for a diffuse one.
+    /// Returns the lights, with every surface taken for a diffuse one.
     pub(crate) fn without_lobes(self) -> Self {
         Self { tells_lobes: false, ..self }
     }
 
-    /// The same with what walls hide from the surfaces that a camera sees, learned with the given number of rays.
+    /// Learns what walls hide from the surfaces that a camera sees, with the given number of rays.
     pub(crate) fn learned(mut self, world: &World, camera: &Camera, rays: u64) -> Result<Self, Error> {
         let point = |i: u64| {
             let mut random = Random::new(i, LEARNING);
@@ -245,7 +245,7 @@ impl Lights {
 pub(crate) struct LightsAt<'a>(PointSampler<'a>);
 
 impl<'a> LightsAt<'a> {
-    /// The same with samples that stand for one light each.
+    /// Returns the lights with samples that stand for one light each.
     pub(crate) fn by_light(self, lights: &'a Lights) -> PlainAt<'a> {
         PlainAt { here: self.0, lights }
     }
@@ -270,7 +270,7 @@ impl LightsAt<'_> {
     }
 }
 
-/// The same, where a sample stands for the point of the emitter that was drawn, or for the sky.
+/// The lights as seen from one point. A sample stands for the point of the emitter that was drawn, or for the sky.
 pub(crate) struct PlainAt<'a> {
     here: PointSampler<'a>,
     lights: &'a Lights,

@@ -60,17 +60,17 @@ impl Material {
         Self { emission, ..Self::new(name, Vec3::ZERO) }
     }
 
-    /// The same with another lobe.
+    /// Returns the material with another lobe.
     pub(crate) fn lobe(self, lobe: Lobe) -> Self {
         Self { lobe, ..self }
     }
 
-    /// The same with an image on it.
+    /// Returns the material with an image on it.
     pub(crate) fn map(self, bitmap: usize) -> Self {
         Self { color_map: Some(bitmap), ..self }
     }
 
-    /// The same with holes where an image has no alpha.
+    /// Returns the material with an image on it, and with holes where that has no alpha.
     pub(crate) fn mask(self, bitmap: usize) -> Self {
         Self { color_map: Some(bitmap), masked: true, ..self }
     }

@@ -27,7 +27,7 @@ pub(crate) struct Mesh {
 /// A mesh that stands in several places, one after the other in the mesh that holds its copies.
 #[derive(Clone, Debug)]
 pub(crate) struct Copies {
-    /// The same for all meshes that hold copies of it.
+    /// What is copied, shared by all meshes that hold copies of it.
     pub(crate) object: Arc<Mesh>,
     /// From its coordinates to the world.
     pub(crate) places: Vec<Affine3A>,

@@ -49,7 +49,7 @@ impl Point {
         if self.normal.dot(direction) >= 0.0 { self.position } else { self.behind }
     }
 
-    /// The same point as a ray in another direction meets it.
+    /// Returns the point as a ray in another direction meets it.
     pub(crate) fn facing(self, direction: Vec3) -> Self {
         if self.normal.dot(direction) <= 0.0 {
             return self;

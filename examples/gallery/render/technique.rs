@@ -19,7 +19,8 @@ pub(crate) enum LightChoice {
     None,
     /// By what they send to the shading point. A direction stands for all that arrives along it.
     Fanlight,
-    /// The same, and a sample stands for the point of the emitter that was drawn, or for the sky.
+    /// By what they send to the shading point. A sample stands for the point of the emitter that was drawn, or for the
+    /// sky.
     Plain,
     /// By what they send, and each sample with the density of the one point that was drawn. Wrong where a ray crosses
     /// several portals.
@@ -64,8 +65,8 @@ impl Techniques {
         Ok(Self { lights, guide: None, choice, environment: true, vertices: u32::MAX, photons: false })
     }
 
-    /// The same path tracer with one sample of `fanlight` at each vertex in place of these: of all lights, and of the
-    /// sky through its portals or, where there are none, as one more light.
+    /// A path tracer with one sample of `fanlight` at each vertex in place of those of [`without`](Self::without): of
+    /// all lights, and of the sky through its portals or, where there are none, as one more light.
     pub(crate) fn plain(model: &Model) -> Result<Self, Error> {
         let lights = Lights::plain(model)?;
         let choice = LightChoice::Plain;
@@ -83,22 +84,22 @@ impl Techniques {
         Ok(Self { lights, guide, choice: LightChoice::Fanlight, environment: true, vertices, photons })
     }
 
-    /// The same with another way to choose points on lights.
+    /// Returns the techniques with another way to choose points on lights.
     pub(crate) fn choosing(self, choice: LightChoice) -> Self {
         Self { choice, ..self }
     }
 
-    /// The same with other lights.
+    /// Returns the techniques with other lights.
     pub(crate) fn with_lights(self, lights: Lights) -> Self {
         Self { lights, ..self }
     }
 
-    /// The same with every surface taken for a diffuse one where lights are chosen.
+    /// Returns the techniques, with every surface taken for a diffuse one where lights are chosen.
     pub(crate) fn without_lobes(self) -> Self {
         Self { lights: self.lights.without_lobes(), ..self }
     }
 
-    /// The same with what walls hide from the surfaces that a camera sees, learned with the given number of rays.
+    /// Learns what walls hide from the surfaces that a camera sees, with the given number of rays.
     pub(crate) fn learned(self, world: &World, camera: &Camera, rays: u64) -> Result<Self, Error> {
         Ok(Self { lights: self.lights.learned(world, camera, rays)?, ..self })
     }

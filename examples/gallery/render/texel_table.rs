@@ -33,7 +33,7 @@ pub(crate) struct TexelTable {
 /// Densities over a triangle.
 struct Densities {
     width: usize,
-    /// The same for all triangles with the same image.
+    /// Densities of all texels per area, shared by all triangles with one image.
     per_area: Arc<[f32]>,
 }
 

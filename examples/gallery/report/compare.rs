@@ -13,7 +13,7 @@ const REFERENCE_FACTOR: u32 = 4;
 /// How much is rendered.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
-    /// Of each image.
+    /// Budget of each image.
     pub(crate) budget: Budget,
     pub(crate) seed: u32,
     /// How many images of each contestant are rendered, with other random numbers each.

@@ -77,7 +77,7 @@ pub(crate) fn overcast(direction: Vec3) -> Vec3 {
     vec3(0.9, 0.97, 1.1) * (1.0 + 2.0 * direction.y) / 3.0
 }
 
-/// The same with a sun behind thin clouds: of this brightness, spread over this many degrees.
+/// An [`overcast`] sky with a sun behind thin clouds: of this brightness, spread over this many degrees.
 pub(crate) fn hazy(sun: Vec3, brightness: f32, degrees: f32) -> Sky {
     painted_sky(|direction| {
         let distance = direction.angle_between(sun).to_degrees() / degrees;

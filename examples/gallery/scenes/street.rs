@@ -29,7 +29,7 @@ pub(crate) fn street() -> Model {
     model
 }
 
-/// The same in thin fog.
+/// The [`street`] in thin fog.
 pub(crate) fn foggy_street() -> Model {
     let mut model = street();
     model.fog = Some(Fog { low: vec3(-FRONT, 0.0, -LENGTH), high: vec3(FRONT, 8.0, 4.0), density: 0.015 });

@@ -30,7 +30,7 @@ pub(crate) fn town() -> Model {
     model
 }
 
-/// The same with every copy as triangles of its own.
+/// Returns a model with every copy as triangles of its own.
 pub(crate) fn flattened(model: &Model) -> Model {
     let mut model = model.clone();
     model.meshes.iter_mut().for_each(|mesh| mesh.copies = None);

@@ -12,9 +12,9 @@ use crate::render::{Error, LUMINANCE, Model, Sky};
 /// What light comes from, outside of the room.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Source {
-    /// Of intensity 1 in all directions.
+    /// A point of intensity 1 in all directions.
     Point(Vec3),
-    /// Of irradiance 1 from a direction.
+    /// A distant light of irradiance 1 from a direction.
     Distant(Vec3),
     /// The model's sky.
     Sky,

@@ -13,7 +13,7 @@ use crate::report::{Comparison, Effort};
 
 /// Photons of one picture.
 const PHOTONS: u32 = 100_000;
-/// And how many times as many make the reference.
+/// How many times as many photons make the reference.
 const REFERENCE_FACTOR: u32 = 64;
 /// How many times as many are timed.
 const TIMED_FACTOR: u32 = 16;

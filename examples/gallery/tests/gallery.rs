@@ -29,13 +29,13 @@ fn check(name: &str, bounces: u32, samples: [u32; 2], share: f64) {
     compare(name, bounces, samples, share, |model| Techniques::without(model).expect("lights"));
 }
 
-/// The same with techniques that the others are compared with.
+/// Compares the means of a scene. The given techniques are those that all others are compared with.
 fn compare(name: &str, bounces: u32, samples: [u32; 2], share: f64, techniques: impl Fn(&render::Model) -> Techniques) {
     let scene = scenes::ALL.iter().find(|scene| scene.name == name).expect("a scene");
     compare_models(name, (scene.model)(), bounces, samples, share, techniques);
 }
 
-/// The same for a model that is not in the list.
+/// Compares the means of a model that is not in the list.
 fn compare_models(
     name: &str,
     mut model: render::Model,

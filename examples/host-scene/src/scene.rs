@@ -25,7 +25,7 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// The same lit through `fanlight`.
+    /// The scene lit through `fanlight`.
     pub(crate) fn through_fanlight() -> Result<Self, fanlight::Error> {
         let own = Self::new();
         Ok(Self { through: Some(Lights::new(&own.lamps)?), ..own })

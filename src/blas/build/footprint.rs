@@ -103,7 +103,7 @@ pub(crate) struct TexelFootprint {
     pub(crate) lo: [f64; 2],
     /// High end of the box around them.
     pub(crate) hi: [f64; 2],
-    /// See [`UvTriangle`].
+    /// How far off a host may look: see [`UvTriangle`].
     pub(crate) slack: [f64; 2],
 }
 

@@ -21,7 +21,7 @@ impl<'a> LightsView<'a> {
         (record.index_and_flags & LightTriangle::LAMP == 0).then_some(record)
     }
 
-    /// Returns anything but a triangle that stands still as seen from a shading point.
+    /// Returns a light that is not a triangle that stands still, as seen from a shading point.
     #[inline]
     pub(in crate::light) fn view_of_other<'v>(
         &self,

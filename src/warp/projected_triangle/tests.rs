@@ -19,7 +19,7 @@ fn direction(pcg: &mut Pcg32) -> DVec3 {
     pcg.direction().as_dvec3()
 }
 
-/// Of all sizes, slivers among them; one in three lies at the horizon, and one in four has a corner on it.
+/// Triangles of all sizes, slivers among them; one in three lies at the horizon, and one in four has a corner on it.
 fn triangles(pcg: &mut Pcg32, count: usize) -> impl Iterator<Item = (SphericalTriangle, ProjectedTriangle)> {
     (0..count).filter_map(|i| {
         let sizes = [3.0, 0.1, 1e-2].map(f64::from);

@@ -201,7 +201,7 @@ impl Image {
 /// Triangles in any places.
 struct Soup {
     positions: Vec<Vec3>,
-    /// The same in another order: where they move to, now and then.
+    /// Positions in another order: where the vertices move to, now and then.
     end: Vec<Vec3>,
     indices: Vec<[u32; 3]>,
     uvs: Vec<Vec2>,

@@ -29,7 +29,7 @@ const DEEPEST_DOUBT: u32 = 8;
 /// Cells with more probability are divided, however equal the density looks: what little they hide would count.
 const HEAVY: f64 = 2e-5;
 
-/// Of 16 points, how many must lie on a linear function.
+/// Number of points, of 16, that must lie on a linear function.
 const MOST: usize = 12;
 
 mod walk;
@@ -53,7 +53,7 @@ impl Density {
         self.pdf * self.scale
     }
 
-    /// The same without the slope of the triangle's density.
+    /// Density in units of one over the triangle's area, without the slope of the triangle's density.
     fn level(self) -> f64 {
         self.by_area() - self.slope
     }

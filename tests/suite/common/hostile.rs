@@ -27,7 +27,7 @@ pub(crate) fn hostile(pcg: &mut Pcg32) -> f32 {
     }
 }
 
-/// Of up to a thousand triangles.
+/// A scene of up to a thousand triangles.
 pub(crate) fn random_scene(number: usize, pcg: &mut Pcg32) -> Scene {
     let triangles = [1, 2, 10, 100, 1000][number % 5];
     let content = Content { triangles, textured: pcg.below(3) > 0, sky: pcg.below(5), two_sided: pcg.below(2) == 0 };
@@ -59,13 +59,13 @@ pub(crate) fn shading_point(number: usize, scene: &Scene, pcg: &mut Pcg32) -> Sh
     x
 }
 
-/// The same points with lobes, down to mirrors.
+/// A point of [`shading_point`] with a lobe, down to mirrors.
 pub(crate) fn shading_point_with_lobe(number: usize, scene: &Scene, pcg: &mut Pcg32) -> ShadingPoint {
     let x = shading_point(number, scene, pcg);
     with_lobe(x, pcg, 1e-4)
 }
 
-/// The same points with microfacets, down to mirrors and to clear glass.
+/// A point of [`shading_point`] with microfacets, down to mirrors and to clear glass.
 pub(crate) fn shading_point_with_microfacets(number: usize, scene: &Scene, pcg: &mut Pcg32) -> ShadingPoint {
     let x = shading_point(number, scene, pcg);
     with_microfacets(x, pcg, 1e-4)

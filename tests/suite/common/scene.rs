@@ -167,7 +167,7 @@ impl LightMesh {
 pub(crate) struct Content {
     pub(crate) triangles: usize,
     pub(crate) textured: bool,
-    /// See [`Sky::random`].
+    /// Kind of the sky: see [`Sky::random`].
     pub(crate) sky: usize,
     /// Whether every mesh is two-sided.
     pub(crate) two_sided: bool,
@@ -281,7 +281,7 @@ pub(crate) const LEAST_EFFORT: usize = 9;
 
 /// Least roughness of lobes whose densities an integration resolves.
 const LEAST_ROUGHNESS: f32 = 0.1;
-/// The same of microfacets, which are narrower along an axis and in a refraction.
+/// Least roughness of microfacets, which are narrower along an axis and in a refraction.
 const LEAST_MICROFACETS: f32 = 0.3;
 
 /// A random point of one of twelve kinds: three receivers, the same with lobes and with microfacets, the first again
@@ -296,7 +296,7 @@ pub(crate) fn point_of_kind(pcg: &mut Pcg32, kind: usize) -> ShadingPoint {
     }
 }
 
-/// The same point with a lobe: a glossy surface in place of a surface, of a roughness between `least` and 1, and a
+/// Returns the point with a lobe: a glossy surface in place of a surface, of a roughness between `least` and 1, and a
 /// phase function in a volume.
 pub(crate) fn with_lobe(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> ShadingPoint {
     let (any, kind, roughness) = (pcg.direction(), pcg.below(8), least.powf(pcg.f32()));
@@ -315,8 +315,8 @@ pub(crate) fn with_lobe(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> Shading
     ShadingPoint::glossy(x.position, Glossy::new(normal, outgoing, roughness).with_weights(diffuse, 1.0))
 }
 
-/// The same point with microfacets of roughnesses between `least` and 1 along a tangent and across: opaque in place of
-/// a surface, and with a transmission in place of all others.
+/// Returns the point with microfacets of roughnesses between `least` and 1 along a tangent and across: opaque in place
+/// of a surface, and with a transmission in place of all others.
 pub(crate) fn with_microfacets(x: ShadingPoint, pcg: &mut Pcg32, least: f32) -> ShadingPoint {
     let (any, tangent, kind) = (pcg.direction(), pcg.direction(), pcg.below(8));
     let (normal, transmits) = match x.receiver {

@@ -23,7 +23,7 @@ pub(crate) struct Tier {
     pub(crate) histogram: usize,
     /// One of this many scenes and points of a family is looked at, where all together take long.
     pub(crate) stride: usize,
-    /// The same where another test looks at the same family.
+    /// One of this many is looked at where another test looks at the same family.
     pub(crate) wide_stride: usize,
     /// Inputs of random bytes.
     pub(crate) inputs: u64,

@@ -65,7 +65,7 @@ pub(crate) fn soup(pcg: &mut Pcg32, count: usize) -> LightMesh {
     mesh
 }
 
-/// The same with vertices that stay exact 1e6 from the origin.
+/// Moves vertices to places that stay exact 1e6 from the origin.
 fn coarse(mut mesh: LightMesh) -> LightMesh {
     mesh.positions.iter_mut().for_each(|p| *p = (*p * 8.0).round() / 2.0);
     mesh
@@ -183,7 +183,7 @@ impl Town {
         Self::new(self.base.clone(), self.objects.clone(), instances)
     }
 
-    /// The same objects in other places.
+    /// Returns a town of the same objects in other places.
     pub(crate) fn with(&self, instances: Vec<(usize, Affine3A, f32)>) -> Self {
         Self::new(self.base.clone(), self.objects.clone(), instances)
     }

@@ -81,7 +81,7 @@ impl Moving {
         Self { start: self.start.first(count), end: self.end.first(count) }
     }
 
-    /// The same with lights that all have two sides.
+    /// Returns the town with lights that all have two sides.
     pub(crate) fn two_sided(&self) -> Self {
         let of = |town: &Town| {
             let two_sided = |mesh: &LightMesh| LightMesh { two_sided: true, ..mesh.clone() };

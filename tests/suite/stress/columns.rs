@@ -50,8 +50,8 @@ pub(crate) fn point(scene: &Scene, column: usize, receiver: usize) -> ShadingPoi
     ShadingPoint::new(position.as_vec3(), receiver)
 }
 
-/// The same point with a lobe: of a glossy surface, of microfacets on a transmissive one, or a phase function. `turn`
-/// decides about the roughness, from 1e-4 to 1, and the outgoing direction: grazing, below the horizon, or above.
+/// Returns the point with a lobe: of a glossy surface, of microfacets on a transmissive one, or a phase function.
+/// `turn` decides about the roughness, from 1e-4 to 1, and the outgoing direction: grazing, below the horizon or above.
 pub(crate) fn with_lobe(x: ShadingPoint, turn: usize) -> ShadingPoint {
     let roughness = [1e-4, 1e-3, 1e-2, 0.1, 1.0][turn % 5];
     let along = Vec3::new(0.6, -0.3, 0.5);

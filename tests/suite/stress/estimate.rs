@@ -35,9 +35,9 @@ impl Even {
 
 /// Means with their standard errors.
 pub(crate) struct Estimate {
-    /// Of what samples bring over their density.
+    /// Mean of what samples bring over their density.
     pub(crate) mean: [f64; 2],
-    /// Of the density over itself, which integrates it; by both techniques alone.
+    /// Mean of the density over itself, which integrates it; by both techniques alone.
     pub(crate) integral: [f64; 2],
     pub(crate) none: [f64; 2],
     /// Samples that brought anything, of all sets.

@@ -10,7 +10,7 @@ use super::sky;
 use crate::common::oracle;
 use crate::common::scene::{Image, LightMesh, Paint, Scene};
 
-/// Of a part of a light: the place relative to the shading point, and the texture coordinates.
+/// Corner of a part of a light: the place relative to the shading point, and the texture coordinates.
 type Corner = (DVec3, DVec2);
 
 /// A polygon this much smaller than its distance is integrated point by point, where the closed forms would cancel.

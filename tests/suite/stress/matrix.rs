@@ -35,9 +35,9 @@ struct Cell {
 
 struct Plan {
     sizes: Sizes,
-    /// Of the variant whose turn it is.
+    /// Effort for the variant whose turn it is.
     whole: Effort,
-    /// Of all other variants: samples and directions alone.
+    /// Effort for all other variants: samples and directions alone.
     others: Option<Effort>,
     /// One receiver a cell, in rotation.
     thin: bool,

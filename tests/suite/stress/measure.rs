@@ -40,12 +40,12 @@ pub(crate) struct Effort {
 /// Relative errors.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Found {
-    /// Of the sum of all integrals and the rate of `None` against one.
+    /// Error of the sum of all integrals and the rate of `None`, which should be one.
     pub(crate) normalization: f64,
     /// What the rate of `None` and the integration do not tell.
     pub(crate) normalization_resolution: f64,
     pub(crate) agreement: f64,
-    /// Of the mean estimate and [`LIMIT`] standard errors of it, if there is enough light.
+    /// Error of the mean estimate, and [`LIMIT`] standard errors of it, if there is enough light.
     pub(crate) irradiance: Option<[f64; 2]>,
     /// Probability of `None`.
     pub(crate) none: f64,

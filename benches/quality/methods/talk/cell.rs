@@ -9,7 +9,7 @@ use glam::Vec3;
 pub(super) struct Cell {
     /// Relative to the shading point.
     vertices: [Vec3; 3],
-    /// The same as places on the triangle.
+    /// Places of the vertices on the triangle.
     places: [[f64; 2]; 3],
     pub(super) depth: u32,
     /// Number among all cells of its depth; four children follow each other.

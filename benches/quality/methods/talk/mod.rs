@@ -34,7 +34,7 @@ pub(crate) struct Talk<'a> {
     scene: &'a Scene,
     pyramid: Pyramid,
     tree: WideTree,
-    /// Of the texture on each triangle.
+    /// Averages of the texture on each triangle.
     averages: Vec<Averages>,
     triangles: Vec<[Vec3; 3]>,
     /// Whether a ray can cross several portals.

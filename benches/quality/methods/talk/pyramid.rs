@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 const DEPTH: u32 = 10;
-/// Of a pixel of the environment.
+/// Solid angle of a pixel of the environment.
 pub(super) const TEXEL_SOLID_ANGLE: f32 = 4.0 * core::f32::consts::PI / (1 << (2 * DEPTH)) as f32;
 
 /// What a region shows.

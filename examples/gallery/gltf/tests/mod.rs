@@ -125,7 +125,7 @@ impl File {
         json.to_string().into_bytes()
     }
 
-    /// The same as a `.glb`.
+    /// The file as a `.glb`.
     pub(super) fn glb(&self) -> Vec<u8> {
         let mut json = self.json.clone();
         json["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
@@ -190,7 +190,7 @@ pub(super) fn brightness(model: &Model) -> f64 {
     brightness_by(model, &Techniques::plain(model).expect("lights"))
 }
 
-/// The same by some techniques.
+/// Mean of the lower third of a picture by some techniques.
 pub(super) fn brightness_by(model: &Model, techniques: &Techniques) -> f64 {
     let world = World::new(model);
     let tracer = PathTracer::new(&world, techniques, 2);

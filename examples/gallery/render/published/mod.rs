@@ -31,7 +31,7 @@ use wide_tree::{WideTree, pick};
 pub(crate) struct Published {
     tree: WideTree,
     triangles: Vec<[Vec3; 3]>,
-    /// Of the radiance over each.
+    /// Averages of the radiance over each triangle.
     averages: Vec<Averages>,
     /// Place of all of the model's triangles among these.
     numbers: Vec<Option<usize>>,

@@ -18,7 +18,7 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// Of the triangle.
+    /// Share of the triangle that the cell covers.
     fn share(&self) -> f64 {
         0.25f64.powi(self.depth as i32)
     }
