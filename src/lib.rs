@@ -59,11 +59,12 @@
 //! with it.
 //! [`add_light`](LightSamplerBuilder::add_light) takes all of them and returns a [`LightId`].
 //!
-//! What stands in a scene many times is built once: [`add_object`](LightSamplerBuilder::add_object) takes the meshes,
+//! A mesh that a scene holds many times is built once: [`add_object`](LightSamplerBuilder::add_object) takes the meshes,
 //! and [`add_instance`](LightSamplerBuilder::add_instance) places them by any affine map ([`Instance`]).
 //!
-//! What moves while the shutter is open says where it is at the end ([`Mesh::moving_to`], [`Instance::moving_to`]), and
-//! a shading point says its time ([`ShadingPoint::at_time`]); all densities are those of that time.
+//! For motion blur, a mesh or an instance has a position at the end of the shutter interval ([`Mesh::moving_to`],
+//! [`Instance::moving_to`]), and a shading point has a time ([`ShadingPoint::at_time`]); all densities are those of that
+//! time.
 //!
 //! Photons start with [`LightSampler::emission`]. In participating media, [`LightSampler::along`] chooses a distance
 //! along a ray.
@@ -93,10 +94,10 @@
 //! - intersecting the host's scene, and visibility. (Rays are intersected with lights only, for the density of a
 //!   direction. What a host finds out about visibility can be learned: [`Visibility`].)
 //! - color. All weights are scalars, by which samples are placed; what a sample carries is up to the host.
-//! - evaluating a BSDF or a phase function. Samples follow the lobe that the host describes; the host's own function
-//!   stays the host's.
+//! - evaluating a BSDF or a phase function. Samples follow the lobe that the host describes; the host evaluates its own
+//!   function.
 //! - reading image or scene files.
-//! - another environment, other objects and other profiles in a built sampler. The environment can be rotated; lights,
+//! - replacing the environment, objects or profiles of a built sampler. The environment can be rotated; lights,
 //!   meshes and instances can be added, removed and changed ([`edit`](LightSampler::edit),
 //!   [`refit`](LightSampler::refit)).
 //! - running on a GPU. The buffers are plain data and can be uploaded, but there are no shaders here.

@@ -80,7 +80,7 @@ pub struct LightEdits<'s, 'a> {
 }
 
 impl fmt::Debug for LightEdits<'_, '_> {
-    /// Shows how much is edited.
+    /// Shows the numbers of edited lights, meshes and instances.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [lights, meshes, instances] = self.changes.counts();
         f.debug_struct("LightEdits")
@@ -94,9 +94,9 @@ impl fmt::Debug for LightEdits<'_, '_> {
 impl LightSampler {
     /// Begins a batch of edits: see [`LightEdits`].
     ///
-    /// Sampling reads and edits write, so that nobody samples meanwhile. A host that does not want to wait edits or
-    /// builds a sampler of its own beside the one that is sampled, as samplers can be cloned, and sent to another
-    /// thread and back:
+    /// Sampling reads and edits write, so nothing can sample meanwhile. A host that does not want to wait edits a
+    /// clone, or builds another sampler, while the current one is sampled. Samplers can be sent to another thread and
+    /// back:
     ///
     /// ```
     /// use std::sync::Arc;

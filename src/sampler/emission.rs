@@ -99,7 +99,7 @@ impl<'a> Emission<'a> {
         self
     }
 
-    /// Returns the power of all that is somewhere.
+    /// Returns the power of all lights but the distant ones.
     fn power(&self) -> f64 {
         let diffuse = PI * outgoing_of_all(&self.scene, &Outgoing::Diffuse);
         let [diffuse_share, through_share] = self.local_shares;

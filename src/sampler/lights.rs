@@ -15,7 +15,7 @@ use crate::visibility::VisibilityView;
 
 /// All lights of a scene, ready to be sampled.
 ///
-/// [`Self::at`] is the door to samples and densities. Sampling reads and never writes, so all threads share one
+/// [`Self::at`] leads to samples and densities. Sampling reads and never writes, so all threads share one
 /// sampler.
 #[derive(Clone, Debug)]
 pub struct LightSampler {
@@ -24,13 +24,13 @@ pub struct LightSampler {
     pub(super) environment: Environment,
     /// What the regions of the environment send, if it is a light itself and not black.
     pub(super) sky: Option<Box<RegionMoments>>,
-    /// Cost of the tree now: see [`Self::decay`].
+    /// Current cost of the tree: see [`Self::decay`].
     pub(super) cost: f64,
     /// Cost of the tree as it was built.
     pub(super) cost_at_build: f64,
     /// Arity of a tree of many lights.
     pub(super) arity: Arity,
-    /// What is there for edits alone.
+    /// Lights and objects that are kept for edits alone.
     pub(super) unplaced: Unplaced,
     /// What edits need to know, from the first one on.
     pub(super) edits: Option<Box<EditState>>,
@@ -69,7 +69,7 @@ impl ByteSizes {
 }
 
 impl LightSampler {
-    /// Returns the same lights in borrowed form.
+    /// Borrows the lights.
     #[inline]
     #[must_use]
     pub fn as_view(&self) -> LightSamplerView<'_> {

@@ -10,7 +10,7 @@ impl LightSampler {
     /// Applies changes of meshes without a rebuild.
     ///
     /// The tree keeps its shape and gets new bounds. Sampling stays exact, but gets noisier the more lights have moved
-    /// in relation to each other; [`Self::decay`] tells when a rebuild pays. Takes time in proportion to the number of
+    /// in relation to each other; [`Self::decay`] shows when a rebuild pays. Takes time in proportion to the number of
     /// all lights, however few have changed.
     ///
     /// A triangle whose area or weight has become zero is never sampled, and comes back if it becomes positive again.
@@ -38,7 +38,7 @@ impl LightSampler {
     }
 
     /// Replaces lights that are not made of triangles, without a rebuild: by lights that have moved, have another
-    /// brightness or are of another kind. What holds of [`Self::refit`] holds of this.
+    /// brightness or are of another kind. [`Self::refit`] describes the effect on samples and time.
     ///
     /// A light of a radiance or intensity of zero is never sampled, and comes back if it is replaced again.
     ///

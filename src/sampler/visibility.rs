@@ -49,8 +49,8 @@ const PASSES: [f64; 3] = [0.25, 0.25, 0.5];
 /// Share of the rays of all passes but the first that are drawn as if nothing had been learned. *Measured* on
 /// `building` (docs/CONSTANTS.md).
 ///
-/// Larger: more rays to what is hidden. Smaller: what is hidden by the table is asked about seldom, and each report
-/// stands for more, up to the inverse of this.
+/// Larger: more rays to what is hidden. Smaller: what the table hides is sampled seldom, and each report stands
+/// for more, up to the inverse of this.
 const UNLEARNED: f64 = 0.5;
 
 /// Rays that are counted together. *Chosen*: it decides about memory and waiting, not about results.
@@ -75,7 +75,7 @@ impl<'a> LightSamplerView<'a> {
     ///
     /// Samples, every density, splitting, batches and resampling use the same factors, so that all of them stay
     /// unbiased and exact for any table, whatever it holds: only noise depends on it. A density belongs to the sampler
-    /// that it was asked of: do not mix those of samplers with different tables, or of one with and one without.
+    /// that computed it: do not mix those of samplers with different tables, or of one with and one without.
     ///
     /// Rays of light that leave the lights ([`Self::emission`]) are drawn as without a table, and [`Self::to_bytes`]
     /// writes the lights alone: a table has bytes of its own.
