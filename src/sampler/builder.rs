@@ -59,7 +59,7 @@ impl LightSampler {
 }
 
 impl fmt::Debug for LightSamplerBuilder<'_> {
-    /// Shows how much has been added.
+    /// Shows the numbers of what has been added.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [textures, meshes, triangles, lights] = self.collection.counts();
         f.debug_struct("LightSamplerBuilder")
@@ -109,7 +109,7 @@ impl<'a> LightSamplerBuilder<'a> {
     /// is seen through portals, leave this off. Where lamps are often hidden,
     /// [`sample_split`](crate::PointSampler::sample_split) without any splitting draws one of each, for a ray more.
     ///
-    /// Without any other light, the environment is the only one. A black environment is none.
+    /// Without any other light, the environment is the only one. A black environment is not a light.
     pub fn environment_as_light(mut self) -> Self {
         self.environment_as_light = true;
         self
@@ -317,7 +317,7 @@ impl<'a> LightSamplerBuilder<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Self::build`], and one of which [`Error::is_cancelled`] is true if `report` has canceled the build.
+    /// As [`Self::build`], and if `report` has canceled the build: then [`Error::is_cancelled`] is true.
     pub fn build_with(self, report: impl Fn(f32) -> ControlFlow<()> + Sync) -> Result<LightSampler, Error> {
         self.build_reporting(Some(&report))
     }

@@ -20,7 +20,7 @@ pub(super) struct DistantRays {
 }
 
 impl DistantRays {
-    /// Returns the rays into a ball; `None` where nothing is sent, or for a ball that is none.
+    /// Returns the rays into a ball; `None` where nothing is sent, or for an invalid ball.
     pub(super) fn new(lights: &LightsView<'_>, center: Vec3, radius: f32) -> Option<Self> {
         let irradiance = lights.extras().distants().iter().map(|light| f64::from(light.irradiance())).sum();
         let is_ball = radius > 0.0 && radius.is_finite() && center.is_finite();

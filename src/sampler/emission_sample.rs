@@ -36,7 +36,7 @@ impl EmissionSample {
         self.light.hit()
     }
 
-    /// Whether the light has an extent. Of a light without one, `pdf` is a density per solid angle alone.
+    /// Whether the light has an extent. For a light without one, `pdf` is a density per solid angle alone.
     #[inline]
     #[must_use]
     pub const fn has_extent(&self) -> bool {

@@ -132,7 +132,7 @@ impl<'a> PointSampler<'a> {
     /// Returns the density per solid angle with which [`Self::sample`] draws this point of this triangle. Zero where it
     /// cannot; never infinite.
     ///
-    /// Where a ray can cross several portals, what a host needs is [`Self::pdf_direction`].
+    /// Where a ray can cross several portals, use [`Self::pdf_direction`].
     #[must_use]
     pub fn pdf(&self, hit: &Hit) -> f32 {
         if self.at.has_few() {
@@ -148,8 +148,8 @@ impl<'a> PointSampler<'a> {
     /// meets of a light that is not made of triangles. Zero where it cannot, and for a light without an extent, which
     /// no ray meets; never infinite.
     ///
-    /// That the ray meets the light is taken from the caller, whose own intersector has found it: rounding may take a
-    /// sampled direction past a small light. Of a distant light with an extent, this is the density of a ray that
+    /// The caller, whose own intersector has found the light, decides that the ray meets it: rounding may take a
+    /// sampled direction past a small light. For a distant light with an extent, this is the density of a ray that
     /// leaves the scene in one of its directions.
     #[must_use]
     pub fn pdf_light(&self, light: LightId, direction: Vec3) -> f32 {
@@ -161,8 +161,7 @@ impl<'a> PointSampler<'a> {
     /// cannot; never infinite. `direction` need not have unit length.
     ///
     /// In a scene without portals and distant lights, this is the density of a ray that has left the scene. It counts
-    /// the environment alone: where the ray can cross portals or lead to a distant light, what a host needs is
-    /// [`Self::pdf_direction`].
+    /// the environment alone: where the ray can cross portals or lead to a distant light, use [`Self::pdf_direction`].
     #[must_use]
     pub fn pdf_environment(&self, direction: Vec3) -> f32 {
         to_finite(self.environment_density(direction, &self.mixture().one()))
@@ -227,8 +226,8 @@ impl<'a> PointSampler<'a> {
     /// The sampled point counts with its own density whatever rounding does to the ray, so the result is never below
     /// `sample.pdf`. Only what else the ray crosses is followed down the trees, so this is faster as well. Where all
     /// lights lie side by side in one plane, or on the surface of one convex body and face into it, nothing else can be
-    /// crossed, and the result is `sample.pdf`. So it is for a light without an extent, whose `sample.pdf` is a
-    /// probability.
+    /// crossed, and the result is `sample.pdf`. The same holds for a light without an extent, whose `sample.pdf`
+    /// is a probability.
     #[must_use]
     pub fn pdf_sample_direction(&self, sample: &LightSample) -> f32 {
         if !sample.has_extent() {

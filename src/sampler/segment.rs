@@ -70,7 +70,7 @@ impl RaySegment {
         x.with_groups(self.groups).at_time(self.time)
     }
 
-    /// The segment as far as anything arrives from it; `None` if from nowhere.
+    /// The part of the segment from which anything arrives; `None` if there is none.
     fn medium(&self) -> Option<MediumSegment> {
         let is_medium = self.extinction >= 0.0 && self.extinction.is_finite() && self.direction != Vec3::ZERO;
         let length = self.length.min(DEEPEST / self.extinction);
@@ -158,7 +158,7 @@ impl<'a> SegmentSampler<'a> {
     }
 
     /// Draws a distance alone, with its density per length, for hosts that do more than one thing there. `u` is uniform
-    /// in `[0, 1)`. `None` for a segment that is none: without a direction or a length, or with one that is too large.
+    /// in `[0, 1)`. `None` for an invalid segment: without a direction or a length, or with a length that is too large.
     #[must_use]
     pub fn sample_distance(&self, u: f32) -> Option<(f32, f32)> {
         let (distance, pdf) = self.distances.as_ref()?.sample(Variate::new(u, seed(&[u])));

@@ -203,7 +203,7 @@ impl VisibilityCounters {
     /// finds the direction most easily, since samples on the others are not needed for it.
     ///
     /// If `here` has a table itself, a report costs about as much as the density of a hit; otherwise a few dozen
-    /// instructions. Of a sample that got through a portal behind which there may be others, it costs as much as the
+    /// instructions. For a sample that got through a portal behind which there may be others, it costs as much as the
     /// density of a direction.
     pub fn report(&mut self, here: &PointSampler<'_>, sample: &LightSample, transmittance: f32) {
         let (x, scene) = (&here.at.x, &here.at.scene);
@@ -286,8 +286,8 @@ impl VisibilityLearner {
         }
     }
 
-    /// Sets the number of bytes that the entries of a table take at most, three MiB by default. Of more entries than
-    /// that, those that matter least are left out.
+    /// Sets the number of bytes that the entries of a table take at most, three MiB by default. If there are more
+    /// entries, those that matter least are left out.
     #[must_use]
     pub fn max_bytes(mut self, bytes: usize) -> Self {
         self.max_bytes = bytes;
@@ -370,8 +370,8 @@ impl Visibility {
     /// or have none, and the rays from there are wasted. Only noise depends on it.
     ///
     /// `transmittance` says which share, in `[0, 1]`, of the light of a sample gets to such a point: for a sample on a
-    /// portal or of the environment, of the light that comes along its direction. Each of the `rays` asks for it once,
-    /// many of them for samples drawn with what the ones before have found. One hundred rays for each room make a useful
+    /// portal or of the environment, of the light that comes along its direction. It is called once for each of the
+    /// `rays`, of which many are drawn with what earlier ones have found. One hundred rays for each room make a useful
     /// table, a few thousand a good one.
     ///
     /// The result does not depend on the number of threads. With the feature `rayon` both functions are called by
@@ -382,7 +382,7 @@ impl Visibility {
     ///
     /// # Errors
     ///
-    /// None but those of [`Self::learn_with`], which are not met here.
+    /// Those of [`Self::learn_with`], which do not occur here.
     pub fn learn(
         lights: &LightSamplerView<'_>,
         rays: u64,
@@ -397,7 +397,7 @@ impl Visibility {
     ///
     /// # Errors
     ///
-    /// One of which [`Error::is_cancelled`] is true if `report` has cancelled.
+    /// If `report` has canceled: [`Error::is_cancelled`] is true.
     pub fn learn_with(
         lights: &LightSamplerView<'_>,
         rays: u64,
