@@ -43,6 +43,13 @@ const FLOOR: f32 = 5e-5;
 /// *Measured* on `building` (docs/CONSTANTS.md). Larger: a smaller table. Smaller: entries that change next to nothing.
 const LEAST_GAIN: f32 = 5e-4;
 
+/// Gain of the first entry of a region. *Chosen*: above all other gains times any number of reports, and finite when it
+/// is multiplied by that number itself.
+///
+/// Larger: products overflow, and where even first entries are too many, those of busy regions are no longer kept first.
+/// Smaller: other entries of busy regions come before the first ones of idle regions.
+const FIRST_GAIN: f32 = 1e20;
+
 /// Least number by which the entries of a region divide the expected square of an estimate: where all lights are seen
 /// alike, entries are left out, since a call with a table costs about a tenth more than one without.
 ///
@@ -352,7 +359,7 @@ impl Distiller<'_> {
                 gain += mass * (factor - above).abs();
             }
             // The first entry says how much arrives at all.
-            let gain = if parent.is_none() { f32::MAX } else { gain };
+            let gain = if parent.is_none() { FIRST_GAIN } else { gain };
             entries.push(FactorEntry { region, key, factors, gain });
         }
         // An entry is kept where one below it is.

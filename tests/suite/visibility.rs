@@ -13,6 +13,8 @@ use fanlight::{
 };
 use glam::Vec3;
 
+mod regions;
+
 /// Largest relative difference of two densities of one point.
 const TOLERANCE: f32 = 1e-5;
 /// Standard errors that two estimates may be apart: a significance of 1e-6 a comparison.
