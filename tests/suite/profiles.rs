@@ -6,11 +6,16 @@ use core::f32::consts::{FRAC_PI_2, PI, TAU};
 use crate::common::bytes::check_changes;
 use crate::common::lights::ARITIES;
 use crate::common::pcg::Pcg32;
-use crate::common::statistics::Mean;
+use crate::common::statistics::{Mean, chi_square, sidak};
 use fanlight::{
     LightId, LightSampler, PointLight, Profile, ProfileId, ProfileLight, Receiver, SampledLight, ShadingPoint,
 };
 use glam::{DVec3, Vec3};
+
+mod sweeps;
+
+/// Significance of all cases of a test together.
+const SIGNIFICANCE: f64 = 0.01;
 
 /// A profile with its arrays.
 #[derive(Clone, Debug)]
@@ -235,6 +240,125 @@ fn photons_carry_the_power_of_the_table() {
         assert!((found - exact).abs() < 5.0 * error + 3e-3 * exact, "{table:?}: {found} ± {error}, not {exact}");
         // The table's cells differ little inside, next to each other.
         assert!(error < 0.02 * exact, "{table:?}: {error}");
+    }
+}
+
+/// Photons leave the cells of the table by their power, and if they are thinned by intensity over density, the quarters
+/// of all cells: both as the table says, by sums in double precision. A table that is off is told apart.
+#[test]
+fn photons_fall_as_the_table_says() {
+    let mut pcg = Pcg32::new(5, 186);
+    let tables = tables(&mut pcg);
+    let significance = sidak(SIGNIFICANCE, 2 * tables.len());
+    let mut told_apart = 0;
+    for table in &tables {
+        let mut builder = LightSampler::builder();
+        let profile = builder.add_profile(&table.profile()).expect("a valid profile");
+        let lamp = place(table, profile, &mut pcg);
+        builder.add_light(lamp.lamp).expect("a valid lamp");
+        let lights = builder.build().expect("one light");
+        let emission = lights.emission();
+        let quarters = Quarters::new(table);
+        let rays: Vec<(usize, f64)> = (0..60_000)
+            .map(|_| {
+                let ray = emission.sample(core::array::from_fn(|_| pcg.f32())).expect("it sends");
+                let direction = ray.direction.as_dvec3();
+                let [x, y, z] = lamp.frame.map(|axis| axis.dot(direction));
+                let quarter = quarters.of(x.hypot(y).atan2(z), y.atan2(x));
+                (quarter, lamp.towards(direction) / f64::from(ray.pdf))
+            })
+            .collect();
+        let most = rays.iter().fold(0.0, |most: f64, (_, ratio)| most.max(*ratio));
+        let powers: Vec<f64> = (0..quarters.count()).map(|quarter| quarters.power(quarter)).collect();
+        let total: f64 = powers.iter().sum();
+        let (mut of_cells, mut of_quarters) = (vec![0.0; powers.len() / 4], vec![0.0; powers.len()]);
+        let (mut thinned, mut expected_of_cells) = (0.0, vec![0.0; powers.len() / 4]);
+        for (quarter, ratio) in rays.iter().copied() {
+            of_cells[quarter / 4] += 1.0;
+            if f64::from(pcg.f32()) * most < ratio {
+                of_quarters[quarter] += 1.0;
+                thinned += 1.0;
+            }
+        }
+        for (quarter, power) in powers.iter().enumerate() {
+            expected_of_cells[quarter / 4] += power / total * rays.len() as f64;
+        }
+        let expected_of_quarters: Vec<f64> = powers.iter().map(|power| power / total * thinned).collect();
+        for (observed, expected) in [(&of_cells, &expected_of_cells), (&of_quarters, &expected_of_quarters)] {
+            let (p, dump) = chi_square(observed, expected);
+            assert!(p > significance, "{table:?}: p = {p:e}\n{dump}");
+        }
+        assert!(thinned > 4000.0, "{table:?}: only {thinned} are left");
+        // The first half of what is expected a quarter too bright.
+        let mut sum = 0.0;
+        let mut wrong = expected_of_quarters;
+        for value in &mut wrong {
+            sum += *value;
+            *value *= if 2.0 * sum < thinned { 1.25 } else { 1.0 };
+        }
+        let all: f64 = wrong.iter().sum();
+        wrong.iter_mut().for_each(|value| *value *= thinned / all);
+        let (p, _) = chi_square(&of_quarters, &wrong);
+        assert!(p < significance * 1e-3 || all < 1.05 * thinned, "{table:?}: p = {p:e} for a wrong table");
+        told_apart += usize::from(p < significance * 1e-3);
+    }
+    assert!(told_apart >= 7, "only {told_apart} of {} wrong tables are told apart", tables.len());
+}
+
+/// The cells of a table, each in four parts.
+struct Quarters<'a> {
+    table: &'a Table,
+    /// Borders of the halves of all cells, vertical and horizontal.
+    borders: [Vec<f64>; 2],
+}
+
+impl<'a> Quarters<'a> {
+    fn new(table: &'a Table) -> Self {
+        let halves = |angles: Vec<f64>| {
+            let middles = angles.windows(2).flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]);
+            middles.chain(angles.last().copied()).collect()
+        };
+        let vertical = table.vertical.iter().map(|angle| f64::from(*angle)).collect();
+        let mut horizontal: Vec<f64> = table.horizontal.iter().map(|angle| f64::from(*angle)).collect();
+        horizontal.push(horizontal[0] + core::f64::consts::TAU);
+        Self { table, borders: [halves(vertical), halves(horizontal)] }
+    }
+
+    fn count(&self) -> usize {
+        self.borders.iter().map(|borders| borders.len() - 1).product()
+    }
+
+    /// Those of a cell follow each other.
+    fn number(&self, [row, column]: [usize; 2]) -> usize {
+        let columns = (self.borders[1].len() - 1) / 2;
+        4 * (row / 2 * columns + column / 2) + 2 * (row % 2) + column % 2
+    }
+
+    fn place(&self, number: usize) -> [usize; 2] {
+        let columns = (self.borders[1].len() - 1) / 2;
+        let (cell, part) = (number / 4, number % 4);
+        [2 * (cell / columns) + part / 2, 2 * (cell % columns) + part % 2]
+    }
+
+    fn of(&self, theta: f64, phi: f64) -> usize {
+        let first = self.borders[1][0];
+        let phi = first + (phi - first).rem_euclid(core::f64::consts::TAU);
+        self.number([(0, theta), (1, phi)].map(|(axis, angle)| {
+            let borders = &self.borders[axis];
+            borders.partition_point(|border| *border <= angle).clamp(1, borders.len() - 1) - 1
+        }))
+    }
+
+    /// Power through a part, by the midpoint rule.
+    fn power(&self, number: usize) -> f64 {
+        let steps = (2000 / self.count()).clamp(6, 60);
+        let [row, column] = self.place(number);
+        let angles = [(0, row), (1, column)].map(|(axis, i)| [self.borders[axis][i], self.borders[axis][i + 1]]);
+        let at = |k: usize, i: usize| angles[k][0] + (angles[k][1] - angles[k][0]) * (i as f64 + 0.5) / steps as f64;
+        let value = |i: usize, j: usize| at(0, i).sin() * self.table.intensity(at(0, i), at(1, j));
+        let sum: f64 = (0..steps * steps).map(|k| value(k / steps, k % steps)).sum();
+        let area: f64 = angles.iter().map(|[a, b]| b - a).product();
+        sum * area / (steps * steps) as f64
     }
 }
 
