@@ -2,7 +2,7 @@
 //! normalization, histograms, agreement, noise, photons, suns, bytes, refits and errors.
 
 use crate::common::density::{OnTriangle, id, probes};
-use crate::common::hostile::shading_point;
+use crate::common::hostile::{hostile, shading_point};
 use crate::common::lights::{ARITIES, aligned, sample_split};
 use crate::common::oracle;
 use crate::common::parallel;
@@ -91,24 +91,37 @@ fn conditional_densities_are_those_of_flattened_triangles() {
     assert!(compared > 40 * rounds.len(), "{compared} samples");
 }
 
-/// All densities of a sample agree, those of rays and of split trees too.
+/// All densities of samples agree, those of rays and of split trees too.
 pub(crate) fn check_agreement(lights: &LightSamplerView<'_>, x: &ShadingPoint, pcg: &mut Pcg32, count: usize) -> usize {
+    check_some(lights, x, pcg, count, 1)
+}
+
+/// The density of each sample is found again. One of `every` samples is asked for all that [`check_agreement`] asks for;
+/// the others come from hostile numbers.
+fn check_some(lights: &LightSamplerView<'_>, x: &ShadingPoint, pcg: &mut Pcg32, count: usize, every: usize) -> usize {
     let at = lights.at(x);
     let splitting = Splitting::new(0.7, 2);
-    let mut drawn = 0;
-    for _ in 0..count {
-        let u = pcg.cube();
+    let mut found = 0;
+    for i in 0..count {
+        let asks_all = i % every == 0;
+        let u = if asks_all { pcg.cube() } else { core::array::from_fn(|_| hostile(pcg)) };
         if let Some(sample) = at.sample(u) {
-            drawn += 1;
+            found += 1;
             let hit = sample.hit().expect("a triangle");
             assert!(close(at.pdf(&hit), sample.pdf, TOLERANCE), "{x:?} {sample:?}: {}", at.pdf(&hit));
-            let pmf = pmf(&at, &hit);
-            assert!(close(pmf, sample.pmf, TOLERANCE) || pmf > sample.pmf, "{x:?} {sample:?}: {pmf}");
-            let along = at.pdf_sample_direction(&sample);
-            assert!(along >= sample.pdf * (1.0 - TOLERANCE as f32) && along.is_finite(), "{x:?} {sample:?}: {along}");
-            let mut many = [None];
-            lights.sample_many(&[(*x, u)], &mut many);
-            assert_eq!(many[0], Some(sample));
+            if asks_all {
+                let pmf = pmf(&at, &hit);
+                assert!(close(pmf, sample.pmf, TOLERANCE) || pmf > sample.pmf, "{x:?} {sample:?}: {pmf}");
+                let along = at.pdf_sample_direction(&sample);
+                let is_enough = along >= sample.pdf * (1.0 - TOLERANCE as f32) && along.is_finite();
+                assert!(is_enough, "{x:?} {sample:?}: {along}");
+                let mut many = [None];
+                lights.sample_many(&[(*x, u)], &mut many);
+                assert_eq!(many[0], Some(sample));
+            }
+        }
+        if !asks_all {
+            continue;
         }
         for sample in sample_split(&at, u, &splitting).iter().take(4) {
             let hit = sample.hit().expect("a triangle");
@@ -116,7 +129,33 @@ pub(crate) fn check_agreement(lights: &LightSamplerView<'_>, x: &ShadingPoint, p
             assert!(close(pdf, sample.pdf, TOLERANCE), "{x:?} {sample:?}: {pdf}");
         }
     }
-    drawn
+    found
+}
+
+/// Draws so many samples at points that are made by their numbers: ten, or one for every thousand samples. Where there
+/// are many, few are asked for all densities. Returns how many samples are drawn, and how many of these are no `None`.
+pub(crate) fn check_many(
+    lights: &LightSampler,
+    pcg: &mut Pcg32,
+    count: usize,
+    mut point: impl FnMut(&mut Pcg32, usize) -> ShadingPoint,
+) -> [usize; 2] {
+    let points = (count / 1000).max(10);
+    let each = count.div_ceil(points);
+    let every = if points > 10 { 40 } else { 1 };
+    let mut found = 0;
+    for number in 0..points {
+        let x = point(pcg, number);
+        found += check_some(&lights.as_view(), &x, pcg, each, every);
+    }
+    [points * each, found]
+}
+
+/// Prints how many samples were drawn in all rounds. Returns how many of them were no `None`.
+pub(crate) fn report(drawn: &[[usize; 2]]) -> usize {
+    let [drawn, found] = drawn.iter().fold([0; 2], |sum, [drawn, found]| [sum[0] + drawn, sum[1] + found]);
+    println!("{drawn} samples, {} of them None: 0 mismatches above {TOLERANCE:e}", drawn - found);
+    found
 }
 
 #[test]
@@ -126,11 +165,9 @@ fn densities_agree() {
     let drawn = parallel::map(all.len(), |i| {
         let (town, mut pcg, number) = all[i].clone();
         let lights = town.build(ARITIES[number % 3]);
-        let points = (0..10).map(|kind| point(&town, &mut pcg, kind)).collect::<Vec<_>>();
-        let samples = agreement(10 * rounds.len(), 250);
-        points.iter().map(|x| check_agreement(&lights.as_view(), x, &mut pcg, samples)).sum::<usize>()
+        check_many(&lights, &mut pcg, agreement(rounds.len(), 2500), |pcg, kind| point(&town, pcg, kind))
     });
-    assert!(drawn.iter().sum::<usize>() > 30 * rounds.len(), "{drawn:?}");
+    assert!(report(&drawn) > 30 * rounds.len(), "{drawn:?}");
 }
 
 /// What a sample brings of one light.

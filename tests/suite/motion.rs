@@ -10,7 +10,7 @@ use crate::common::scene::{LightMesh, Paint, Scene, Sky};
 use crate::common::statistics::{Mean, chi_square, sidak};
 use crate::common::tier::{agreement, some, tier};
 use crate::instances::town::Town;
-use crate::instances::{check_agreement, pmf, point};
+use crate::instances::{check_agreement, check_many, pmf, point, report};
 use fanlight::{Arity, Hit, LightSample, LightSampler, PointSampler, RaySegment, ShadingPoint};
 use glam::{Affine3A, Mat3, Quat, Vec3};
 
@@ -105,16 +105,12 @@ fn densities_agree_at_all_times() {
         let number = rounds[i];
         let (case, mut pcg) = Case::new(number, 302, number % 5, None);
         let lights = case.build();
-        let samples = agreement(10 * rounds.len(), 200);
-        let mut drawn = 0;
-        for kind in 0..10 {
+        check_many(&lights, &mut pcg, agreement(rounds.len(), 2000), |pcg, kind| {
             // Any time, and beyond the interval.
-            let x = case.point(&mut pcg, kind).at_time(pcg.within(-0.2, 1.2));
-            drawn += check_agreement(&lights.as_view(), &x, &mut pcg, samples);
-        }
-        drawn
+            case.point(pcg, kind).at_time(pcg.within(-0.2, 1.2))
+        })
     });
-    assert!(drawn.iter().sum::<usize>() > 20 * rounds.len(), "{drawn:?}");
+    assert!(report(&drawn) > 20 * rounds.len(), "{drawn:?}");
 }
 
 fn estimate(at: &PointSampler<'_>, pcg: &mut Pcg32, count: usize, value: impl Fn(&LightSample) -> f64) -> Mean {
