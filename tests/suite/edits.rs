@@ -1,5 +1,6 @@
 //! A sampler that has been edited holds the same lights as one that is freshly built, and keeps the same promises.
 
+mod densities;
 mod world;
 
 use proptest::prelude::*;

@@ -33,6 +33,8 @@ pub(crate) struct World {
     kind: usize,
     /// Whether meshes and instances may move while the shutter is open.
     pub(crate) moves: bool,
+    /// Whether most light is of lights with an extent.
+    has_extents: bool,
     lamps: BTreeMap<LightId, (Lamp, u32)>,
     patches: BTreeMap<MeshId, Patch>,
     instances: BTreeMap<InstanceId, Instance>,
@@ -139,9 +141,15 @@ impl World {
     /// Lights of some kinds: without an extent, of all kinds, with light groups, with instances. From the twelfth kind
     /// on, they are the same, and some move.
     pub(crate) fn random(pcg: &mut Pcg32, kind: usize, count: usize) -> Self {
+        Self::with(pcg, kind, count, false)
+    }
+
+    /// Lights as [`Self::random`] makes them, where `has_extents` leaves out most lamps without an extent and makes
+    /// instances brighter.
+    pub(crate) fn with(pcg: &mut Pcg32, kind: usize, count: usize, has_extents: bool) -> Self {
         let (kind, moves) = (kind % KINDS, kind >= KINDS);
         let (lamps, patches, instances) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        let mut world = Self { kind, moves, lamps, patches, instances };
+        let mut world = Self { kind, moves, has_extents, lamps, patches, instances };
         for _ in 0..count {
             let groups = world.groups(pcg);
             match pcg.below(3) {
@@ -190,6 +198,9 @@ impl World {
     fn lamp(&self, pcg: &mut Pcg32) -> Lamp {
         loop {
             let lamp = lamp(pcg);
+            if self.has_extents && matches!(lamp, Lamp::Point(_) | Lamp::Distant(_)) && pcg.below(16) > 0 {
+                continue;
+            }
             // Without an extent, the density of a direction is known to be that of a light.
             if self.kind % 4 > 0 || matches!(lamp, Lamp::Point(_)) {
                 return lamp;
@@ -203,6 +214,7 @@ impl World {
         let place =
             Affine3A::from_scale_rotation_translation(scale, rotation, 4.0 * Vec3::from_array(pcg.cube()) - 2.0);
         let factor = if pcg.below(6) == 0 { 0.0 } else { pcg.within(0.5, 2.0) };
+        let factor = if self.has_extents { 20.0 * factor } else { factor };
         let instance = Instance::new(ObjectId::from_index(pcg.below(2) as u32), place).scaled(factor).groups(groups);
         if !self.moves || pcg.below(3) == 0 {
             return instance;
