@@ -46,6 +46,23 @@ use crate::record::{InstanceId, LightId, MeshId, TextureId};
 /// The number of what was removed is free, and later batches give it to what they add. So an id of something removed
 /// must not be used after the batch that removed it. Within that batch it is an error.
 ///
+/// # What needs a new build
+///
+/// Some of what a builder is told stays what it is, and another sampler has to be built to change it:
+///
+/// - Objects: instances are of those that were added with
+///   [`add_object`](crate::LightSamplerBuilder::add_object). An object need not have an instance when the sampler is
+///   built.
+/// - Profiles and projections: lights refer to those that were added with
+///   [`add_profile`](crate::LightSamplerBuilder::add_profile) and
+///   [`add_projection`](crate::LightSamplerBuilder::add_projection).
+/// - The environment and its light groups. Its rotation is changed by
+///   [`set_environment_rotation`](LightSampler::set_environment_rotation).
+/// - The arity and the illumination that the sampler was built for.
+///
+/// The triangles, texture, sides and light groups of a mesh stay the same as well, and so do the light groups of a light
+/// that is not made of triangles. To change them, remove it and add another one: that may be in one batch.
+///
 /// # Time and memory
 ///
 /// An edit takes a time in proportion to the depth of the light tree, and edits of one part of a tree share most of it.
