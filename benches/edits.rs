@@ -7,11 +7,15 @@
 //! `exact-sel` is the variance of the irradiance that is left by the choice of a light, relative to the squared
 //! irradiance: the median over shading points.
 //!
-//! `cargo bench -p fanlight-benches --bench edits`; with `--features rayon`, rebuilds on all threads.
+//! `removed-N` is `N` meshes of a triangle that were there and are removed: the time to add one, in batches of one and
+//! all that were removed in one batch.
+//!
+//! `cargo bench -p fanlight-benches --bench edits`; with `--features rayon`, rebuilds on all threads; with
+//! `-- removed`, only the rows of meshes that were removed.
 
 use std::time::Instant;
 
-use fanlight::{LightId, LightSampler, PointLight, ShadingPoint};
+use fanlight::{LightId, LightSampler, Mesh, MeshId, PointLight, ShadingPoint};
 use glam::Vec3;
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
@@ -198,10 +202,51 @@ fn row(count: usize, frames: usize) {
     );
 }
 
+/// Times to add meshes after `count` meshes were removed.
+fn row_of_removed(count: usize, singles: usize) {
+    let mut pcg = Pcg32::new(2, 2);
+    let corners = [Vec3::ZERO, 0.01 * Vec3::X, 0.01 * Vec3::Y];
+    let mut place = || {
+        let at = vector(&mut pcg);
+        corners.map(|corner| corner + at)
+    };
+    let mut builder = LightSampler::builder();
+    let kept = 1000;
+    for _ in 0..count + kept {
+        builder.add_mesh(&Mesh::emitter(&place(), &[[0, 1, 2]])).expect("the mesh is valid");
+    }
+    let mut lights = builder.build().expect("the meshes are few");
+    let mut edits = lights.edit();
+    for number in kept..kept + count {
+        edits.remove_mesh(MeshId::from_index(number as u32)).expect("the mesh is there");
+    }
+    edits.apply().expect("nothing is added");
+    let mut times = [singles, count - singles].into_iter().enumerate().map(|(i, added)| {
+        let places: Vec<_> = (0..added).map(|_| place()).collect();
+        let start = Instant::now();
+        for batch in places.chunks(if i == 0 { 1 } else { added.max(1) }) {
+            let mut edits = lights.edit();
+            for positions in batch {
+                edits.add_mesh(&Mesh::emitter(positions, &[[0, 1, 2]])).expect("the mesh is valid");
+            }
+            edits.apply().expect("the meshes are few");
+        }
+        1e6 * start.elapsed().as_secs_f64() / added as f64
+    });
+    let [single, together] = [times.next(), times.next()].map(|time| time.expect("there are two"));
+    println!(
+        "removed-{count}: {single:.2} µs to add a mesh in its own batch, {together:.2} µs together with the others"
+    );
+}
+
 fn main() {
     // `cargo test` wants to see it run once.
     if !std::env::args().any(|word| word == "--bench") {
+        row_of_removed(100, 10);
         return row(1000, 10);
+    }
+    if std::env::args().any(|word| word == "removed") {
+        return [2_000, 20_000, 100_000].into_iter().for_each(|count| row_of_removed(count, 1000));
     }
     let wanted: Vec<usize> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
     let counts = if wanted.is_empty() { vec![10_000, 1_000_000] } else { wanted };

@@ -1,6 +1,7 @@
 //! A sampler that has been edited holds the same lights as one that is freshly built, and keeps the same promises.
 
 mod densities;
+mod distant;
 mod world;
 
 use proptest::prelude::*;
@@ -336,6 +337,49 @@ fn check_memory(kind: usize) {
         }
     }
     compare(&world, &lights, &mut pcg).expect("the lights are those of a fresh build");
+}
+
+/// The places of removed meshes go to new ones that need at least half of them: those of the last one that was removed
+/// first. What a batch takes is not given out twice, and what it takes without being applied stays free.
+#[test]
+fn the_places_of_the_last_mesh_that_was_removed_are_the_next() {
+    let mesh = MeshId::from_index;
+    let mut builder = LightSampler::builder();
+    let triple = Mesh::emitter(&QUAD, &[[0, 1, 2]; 3]);
+    for number in 0..12 {
+        builder.add_mesh(&if number < 10 { quad() } else { triple }).expect("the mesh is valid");
+    }
+    let mut lights = builder.build().expect("the lights are few");
+    let remove = |lights: &mut LightSampler, numbers: &[u32]| {
+        let mut edits = lights.edit();
+        numbers.iter().for_each(|&number| edits.remove_mesh(mesh(number)).expect("the mesh is there"));
+        edits.apply().expect("nothing is added");
+    };
+    // Of one batch in the order of their numbers.
+    remove(&mut lights, &[9, 2, 5]);
+    remove(&mut lights, &[3]);
+    for is_applied in [false, true] {
+        let mut edits = lights.edit();
+        for number in [3, 9, 5, 2, 12, 13] {
+            assert_eq!(edits.add_mesh(&quad()), Ok(mesh(number)));
+        }
+        if is_applied {
+            edits.remove_mesh(mesh(5)).expect("it was added before");
+            assert_eq!(edits.add_mesh(&quad()), Ok(mesh(14)));
+            edits.apply().expect("the lights are few");
+        }
+    }
+    assert_eq!(lights.light_count(), 12 + 2 * 2 + 3 - 1);
+    // Three places are enough for two triangles, but not known to be for three.
+    remove(&mut lights, &[10, 0]);
+    let mut edits = lights.edit();
+    assert_eq!(edits.add_mesh(&triple), Ok(mesh(15)));
+    assert_eq!(edits.add_mesh(&Mesh::emitter(&QUAD, &[[0, 1, 2]; 2])), Ok(mesh(10)));
+    assert_eq!(edits.add_mesh(&quad()), Ok(mesh(0)));
+    assert_eq!(edits.add_mesh(&quad()), Ok(mesh(5)));
+    assert_eq!(edits.add_mesh(&quad()), Ok(mesh(16)));
+    edits.apply().expect("the lights are few");
+    assert_eq!(lights.light_count(), 18 - 4 + 3 + 2 + 3);
 }
 
 #[test]

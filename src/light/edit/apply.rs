@@ -61,7 +61,7 @@ impl EditState {
     /// If there are more lights or more nodes over textures than can be numbered, or a factor times the weight of a
     /// mesh that was added is too large.
     pub(crate) fn apply(&mut self, changes: LightChanges<'_>, edited: Edited<'_>) -> Result<Applied, Error> {
-        let LightChanges { mut collection, lamps, meshes, instances, .. } = changes;
+        let LightChanges { mut collection, lamps, meshes, instances, reused_meshes, .. } = changes;
         let Edited { lights, tlas, environment, arity } = edited;
         // 1. What may fail.
         collection.build_images(&Progress::new(None, 1.0))?;
@@ -84,6 +84,7 @@ impl EditState {
         // 2. Room for what is added.
         let base = append_cells(&mut lights.cells, &collection.cells);
         self.lights.reserve_instances(lights, &instances);
+        self.lights.take_free_meshes(&reused_meshes);
         for (&number, change) in &meshes {
             if let Some(added) = change.added {
                 self.lights.allocate_mesh(lights, number, collection.mesh(added).len() as u32);
@@ -316,6 +317,15 @@ impl Application<'_, '_> {
 }
 
 impl LightsState {
+    /// Takes the removed meshes whose places are given to new ones: of each class, the last that were removed.
+    fn take_free_meshes(&mut self, counts: &BTreeMap<u32, usize>) {
+        for (class, &count) in counts {
+            if let Some(free) = self.free_meshes.get_mut(class) {
+                free.truncate(free.len() - count);
+            }
+        }
+    }
+
     /// Gives a new mesh places for its triangles.
     fn allocate_mesh(&mut self, lights: &mut Lights, number: u32, triangles: u32) {
         let places = places_of(triangles);
@@ -323,9 +333,6 @@ impl LightsState {
         let is_new = number >= self.meshes.count();
         self.meshes.insert(number);
         if !is_new {
-            if let Some(free) = self.free_meshes.get_mut(&class_of(places)) {
-                free.retain(|mesh| *mesh != number);
-            }
             return;
         }
         // The last mesh is that of the spare places.

@@ -29,9 +29,11 @@ pub(crate) struct LightChanges<'a> {
     /// Numbers from which on free ones are looked for.
     next_lamp: u32,
     next_instance: u32,
-    /// Numbers of meshes that are given out: new ones, and how many free ones by the logarithms of their places.
+    /// Number of the next mesh that takes new places.
     next_mesh: u32,
-    reused_meshes: BTreeMap<u32, usize>,
+    /// How many removed meshes are given out again, by the logarithm of the number of their places. The last ones that
+    /// were removed come first.
+    pub(super) reused_meshes: BTreeMap<u32, usize>,
     /// Places of triangles that new meshes take.
     places: usize,
 }
@@ -183,7 +185,7 @@ impl<'a> LightChanges<'a> {
         let places = places_of(triangles as u32);
         let class = class_of(places);
         let reused = self.reused_meshes.get(&class).copied().unwrap_or(0);
-        let free = state.lights.free_meshes.get(&class).and_then(|free| free.iter().rev().nth(reused));
+        let free = state.lights.free_meshes.get(&class).and_then(|free| free.get(free.len().checked_sub(reused + 1)?));
         check_count("places of triangles", lights.leaf_of.len() + self.places + places as usize)?;
         let MeshId(added) = self.collection.add_mesh(mesh)?;
         let number = if let Some(&number) = free {

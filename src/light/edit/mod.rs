@@ -80,7 +80,8 @@ struct LightsState {
     lamps: Numbers,
     meshes: Numbers,
     instances: Numbers,
-    /// Removed meshes, by the logarithm of the number of their places.
+    /// Removed meshes, by the logarithm of the number of their places, in the order in which they were removed. The last
+    /// ones are given out first, so that it takes no search to find or to take them.
     free_meshes: BTreeMap<u32, Vec<u32>>,
     /// Numbers of triangles of those meshes that have more places than triangles.
     mesh_sizes: BTreeMap<u32, u32>,
