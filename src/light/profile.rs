@@ -228,6 +228,19 @@ impl<'a> ProfileTable<'a> {
         f64::from(self.sums[cell]) - f64::from(before)
     }
 
+    /// Returns the mean cosine between the axis and the directions in which light leaves, by the power of each row.
+    pub(super) fn mean_cosine(&self) -> f64 {
+        let Profile { vertical, horizontal, .. } = self.profile;
+        let (mut mean, mut before) = (0.0, 0.0);
+        for (angles, sums) in vertical.windows(2).zip(self.sums.chunks_exact(horizontal.len())) {
+            let [top, bottom] = [angles[0], angles[1]].map(|angle| math::cos64(angle.into()));
+            let sum = sums.last().map_or(before, |&sum| f64::from(sum));
+            mean += (sum - before) * 0.5 * (top + bottom);
+            before = sum;
+        }
+        mean
+    }
+
     /// Returns the intensity in a direction in the frame of the light.
     pub(super) fn intensity(&self, direction: [f64; 3]) -> f32 {
         self.profile.intensity(angles_of_direction(direction))

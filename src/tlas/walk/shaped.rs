@@ -25,7 +25,7 @@ impl<const N: usize> Node<N> {
         let [shaped, everywhere, above] = InstructionSet::best().run(LaneSets { node: self, x });
         // No side is averted of what sends everywhere: what is left of the doubt is the horizon.
         estimates.doubtful[0] &= !(shaped & everywhere & above);
-        // What sends everywhere and has two sides is asked what it sends.
+        // What sends everywhere, but unevenly, is asked what it sends: it has two sides or a mean normal.
         let uneven = shaped & everywhere & self.uneven_leaves();
         estimates.doubtful.iter_mut().for_each(|set| *set |= uneven);
         let mut waiting = shaped & !everywhere;
@@ -41,11 +41,12 @@ impl<const N: usize> Node<N> {
         estimates
     }
 
-    /// Returns the lanes of leaves that are two-sided and may send something, as a set of bits.
+    /// Returns the lanes of leaves that are two-sided or have a mean normal, and may send something, as a set of bits.
     #[inline]
     fn uneven_leaves(&self) -> u32 {
-        let (normals, energies) = (self.normals, self.energies);
-        let of = |lane: usize| u32::from(normals[lane] & LANE_TWO_SIDED != 0 && energies[lane] != 0) << lane;
+        let (normals, lengths, energies) = (self.normals, self.lengths, self.energies);
+        let is_uneven = |lane: usize| normals[lane] & LANE_TWO_SIDED != 0 || lengths[lane] != 0;
+        let of = |lane: usize| u32::from(is_uneven(lane) && energies[lane] != 0) << lane;
         (usize::from(self.node_count)..usize::from(self.width).min(N)).fold(0, |set, lane| set | of(lane))
     }
 

@@ -41,7 +41,7 @@ fn learned(number: usize, pcg: &mut Pcg32) -> (LightSampler, Visibility, Vec<Lig
     (lights, visibility, samples)
 }
 
-/// The same table without an outside: what is in no region is in the first one.
+/// Returns the table without an outside: what is in no region is in the first one.
 fn without_outside(visibility: &Visibility) -> Visibility {
     let bytes = visibility.to_bytes();
     let mut words = aligned(&bytes);
