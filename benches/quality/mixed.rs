@@ -129,7 +129,7 @@ fn sphere_factor(sin2: f64, cosine: f64) -> f64 {
 
 /// What is compared.
 enum Method {
-    Fanlight(LightSampler),
+    Fanlight(Box<LightSampler>),
     Power(f64),
     Tree(BinaryTree),
     Every(Vec<LightBounds>),
@@ -144,7 +144,7 @@ impl Method {
                 lamps.iter().for_each(|lamp| {
                     builder.add_light(lamp.light()).expect("the workload is valid");
                 });
-                Self::Fanlight(builder.build().expect("the workload is small"))
+                Self::Fanlight(Box::new(builder.build().expect("the workload is small")))
             }
             "power" => Self::Power(lamps.iter().map(|lamp| f64::from(lamp.bounds().phi)).sum()),
             "binary-tree" => Self::Tree(BinaryTree::new(&bounds())),

@@ -7,7 +7,10 @@
 //! A file with a folder of its own (`light/mod.rs`) may use the files in that folder, which may use what it defines:
 //! such a file is the face of its folder, and the type that all files below it are about is often there.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+extern crate alloc;
+
+use alloc::collections::{BTreeMap, BTreeSet};
+use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
@@ -202,7 +205,7 @@ fn resolve(sources: &Sources, module: &[String], path: &[String]) -> Result<Opti
             _ if !is_last && sources.contains_key(&child) => at = child,
             _ if source.items.contains(name) => return Ok(Some(at)),
             // What stands for itself is a macro of this file.
-            _ if source.imports.get(name).is_some_and(|import| import != &[name.clone()]) => {
+            _ if source.imports.get(name).is_some_and(|import| import.as_slice() != core::slice::from_ref(name)) => {
                 let rest = [source.imports[name].as_slice(), &path[i + 1..]].concat();
                 return resolve(sources, &at, &rest);
             }

@@ -1,7 +1,9 @@
 //! Modules import only what lies below them: the table of the design, read against every `crate::` path in `src`. No
 //! name of a constant stands for two values.
 
-use std::collections::BTreeMap;
+extern crate alloc;
+
+use alloc::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
