@@ -45,8 +45,8 @@ impl<const N: usize> Node<N> {
     #[inline]
     fn uneven_leaves(&self) -> u32 {
         let (normals, lengths, energies) = (self.normals, self.lengths, self.energies);
-        let is_uneven = |lane: usize| normals[lane] & LANE_TWO_SIDED != 0 || lengths[lane] != 0;
-        let of = |lane: usize| u32::from(is_uneven(lane) && energies[lane] != 0) << lane;
+        let is_uneven = |lane: usize| (normals[lane] & LANE_TWO_SIDED != 0) | (lengths[lane] != 0);
+        let of = |lane: usize| u32::from(is_uneven(lane) & (energies[lane] != 0)) << lane;
         (usize::from(self.node_count)..usize::from(self.width).min(N)).fold(0, |set, lane| set | of(lane))
     }
 
