@@ -4,9 +4,11 @@
 //! side of the box around its reports, so that empty space costs a few planes at most, however large the scene.
 
 use alloc::boxed::Box;
+use alloc::collections::BinaryHeap;
 use alloc::string::ToString;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cmp::Reverse;
 
 use glam::Vec3;
 
@@ -135,33 +137,33 @@ impl RegionBuilder {
         Some(new)
     }
 
-    /// Divides regions until none holds more than `most` of these positions, or there are `limit` regions.
+    /// Divides regions until none holds more than `most` of these positions, or there are `limit` regions, those with
+    /// the most positions first: where the limit is reached, a small place that many look at is still found in a large
+    /// scene.
     pub(crate) fn cover(&mut self, points: &mut [(usize, Vec3)], most: usize, limit: usize) {
-        let (mut from, mut waiting) = (0, Vec::new());
+        let (mut from, mut waiting) = (0, BinaryHeap::new());
+        let waits = |region: u32, start: usize, end: usize| (end - start, Reverse(region), start);
         points.sort_by_key(|(orientation, _)| *orientation);
         for root in 0..ORIENTATIONS {
             let count = points[from..].iter().take_while(|(orientation, _)| *orientation == root).count();
             points[from..from + count].iter().for_each(|(_, position)| self.around[root].add(*position));
-            waiting.push((root as u32, from, from + count));
+            waiting.push(waits(root as u32, from, from + count));
             from += count;
         }
-        // Breadth first, so that the limit is shared.
-        let mut next = 0;
-        while let Some(&(region, start, end)) = waiting.get(next) {
-            next += 1;
-            let points = &mut points[start..end];
+        while let Some((count, Reverse(region), start)) = waiting.pop() {
+            if count <= most || self.len() >= limit {
+                break;
+            }
+            let points = &mut points[start..start + count];
             let mut extent = RegionExtent::EMPTY;
             points.iter().for_each(|(_, position)| extent.add(*position));
-            if points.len() <= most || self.len() >= limit {
-                continue;
-            }
             let Some((axis, plane)) = extent.middle() else { continue };
             self.extents[region as usize] = extent;
             let Some(new) = self.divide(region) else { continue };
             points.sort_by_key(|(_, position)| position[axis] >= plane);
             let below = points.iter().take_while(|(_, p)| !(p[axis] >= plane)).count();
-            waiting.push((region, start, start + below));
-            waiting.push((new, start + below, end));
+            waiting.push(waits(region, start, start + below));
+            waiting.push(waits(new, start + below, start + count));
         }
         self.extents.fill(RegionExtent::EMPTY);
     }
