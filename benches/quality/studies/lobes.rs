@@ -6,7 +6,9 @@
 //! lobe is mirrored to its other side.
 //!
 //! `resampled-8` is what a host does whose BSDF the crate does not know: a pair whose light sample is one of eight
-//! blind ones, chosen by what it brings.
+//! blind ones, chosen by what it brings. `power` is a pair by the power heuristic with the exponent 2 (Veach and Guibas
+//! 1995). `pair@ideal` is the pair, by the balance heuristic, of a sample of the BSDF and one in exact proportion to
+//! what arrives: what no light sampling is better than that knows everything.
 //! Emitters do not cover each other: a ray sees all that it crosses.
 
 use core::f64::consts::{FRAC_1_PI, PI, TAU};
@@ -37,7 +39,8 @@ const MICROFACETS: [(&str, &str, [f64; 2], f64); 6] = [
     ("quad", "lobe-quad-brushed-0.05-0.2", [0.05, 0.2], 0.0),
     ("quad", "lobe-quad-pane-0.1", [0.1, 0.1], 0.9),
 ];
-const METHODS: [&str; 6] = ["light", "light@lobe", "bsdf", "pair", "pair@lobe", "resampled-8"];
+const METHODS: [&str; 9] =
+    ["light", "light@lobe", "bsdf", "pair", "pair@lobe", "resampled-8", "power", "power@lobe", "pair@ideal"];
 /// Candidates of the last one.
 const CANDIDATES: usize = 8;
 
@@ -216,50 +219,65 @@ impl<'a> View<'a> {
     }
 
     /// Variances of all methods, and the squared mean. `None` where nothing arrives.
-    fn measure(&self, samples: usize, pcg: &mut Pcg32, point: u64) -> Option<([f64; 6], f64)> {
+    fn measure(&self, samples: usize, pcg: &mut Pcg32, point: u64) -> Option<([f64; METHODS.len()], f64)> {
         // Second moments of light sampling, by samples of lights and of the lobe together, and the halves of pairs.
         let mut of_light = [0.0; 2];
-        let (mut halves, mut of_lobe) = ([[Moments::default(); 2]; 2], 0.0);
+        let (mut halves, mut power, mut of_lobe) = ([[Moments::default(); 2]; 2], [[Moments::default(); 2]; 2], 0.0);
         let (mut resampled, mut candidates) = (Moments::default(), Pcg32::new(point, 10));
+        let mut arrivals = Arrivals::default();
         for _ in 0..samples {
             for (k, x) in self.points.iter().enumerate() {
-                let mut estimate = 0.0;
+                let (mut estimate, mut by_power) = (0.0, 0.0);
                 if let Some(drawn) = self.method.sample(x, pcg.uniform3()) {
                     let (value, pdf) = self.lobe.value_and_pdf(drawn.direction.as_dvec3());
-                    let f = self.weight(&drawn) * value;
-                    estimate = f / (drawn.pdf + pdf);
-                    of_light[k] += f * f / (drawn.pdf * (drawn.pdf + pdf));
+                    let arrival = Arrival { f: self.weight(&drawn) * value, light: drawn.pdf, bsdf: pdf };
+                    estimate = arrival.over_both();
+                    by_power = arrival.by_power(drawn.pdf);
+                    of_light[k] += arrival.f / drawn.pdf * estimate;
+                    arrivals.of_light.extend((k == 1).then_some(arrival));
                 }
                 halves[k][0].add(estimate);
+                power[k][0].add(by_power);
             }
             resampled.add(self.resample(&mut candidates));
             let direction = self.lobe.sample(pcg);
             let (value, pdf) = self.lobe.value_and_pdf(direction);
-            let (mut estimates, mut seen) = ([0.0; 2], 0.0);
+            let (mut estimates, mut by_power, mut seen) = ([0.0; 2], [0.0; 2], 0.0);
+            let first = arrivals.of_bsdf.len();
             if value > 0.0 {
                 for drawn in self.hits(direction) {
                     let f = self.weight(&drawn) * value;
                     seen += f / pdf;
                     for (k, x) in self.points.iter().enumerate() {
-                        let p = self.method.pdf(x, &drawn);
-                        estimates[k] += f / (p + pdf);
-                        if p > 0.0 {
-                            of_light[k] += f * f / (p * (p + pdf));
+                        let arrival = Arrival { f, light: self.method.pdf(x, &drawn), bsdf: pdf };
+                        estimates[k] += arrival.over_both();
+                        by_power[k] += arrival.by_power(pdf);
+                        if arrival.light > 0.0 {
+                            of_light[k] += f / arrival.light * arrival.over_both();
                         }
+                        arrivals.of_bsdf.extend((k == 1).then_some(arrival));
                     }
                 }
             }
-            (0..2).for_each(|k| halves[k][1].add(estimates[k]));
+            arrivals.rays.push(first..arrivals.of_bsdf.len());
+            for k in 0..2 {
+                halves[k][1].add(estimates[k]);
+                power[k][1].add(by_power[k]);
+            }
             of_lobe += seen * seen;
         }
         let count = samples as f64;
         let mean = (halves[1][0].sum + halves[1][1].sum) / count;
         let e2 = mean * mean;
-        let pair = |k: usize| 2.0 * (halves[k][0].variance() + halves[k][1].variance());
-        let resampled = 2.0 * (resampled.variance() + halves[0][1].variance());
+        let pair = |[light, bsdf]: [Moments; 2]| 2.0 * (light.variance() + bsdf.variance());
         let [blind, known] = of_light.map(|moment| moment / count - e2);
-        let variances = [blind, known, of_lobe / count - e2, pair(0), pair(1), resampled];
-        (mean > 0.0).then_some((variances.map(|v| v.max(0.0)), e2))
+        let [pairs, powers] = [halves.map(pair), power.map(pair)];
+        let resampled = pair([resampled, halves[0][1]]);
+        let ideal = arrivals.ideal_pair(mean);
+        let of_lobe = of_lobe / count - e2;
+        let variances =
+            [blind, known, of_lobe, pairs[0], pairs[1], resampled, powers[0], powers[1], ideal].map(|v| v.max(0.0));
+        (mean > 0.0).then_some((variances, e2))
     }
 
     /// The half of a pair that one of several samples without the lobe brings.
@@ -293,6 +311,54 @@ impl<'a> View<'a> {
             radiance: None,
         };
         self.lights.iter().filter(is_crossed).map(drawn)
+    }
+}
+
+/// What arrives along a direction, and how probable the direction is.
+#[derive(Clone, Copy)]
+struct Arrival {
+    /// Radiance times what the receiver scatters of it.
+    f: f64,
+    /// Densities of a light sample with the lobe, and of a sample of the BSDF.
+    light: f64,
+    bsdf: f64,
+}
+
+impl Arrival {
+    /// Either half of a pair, by the balance heuristic.
+    fn over_both(&self) -> f64 {
+        self.f / (self.light + self.bsdf)
+    }
+
+    /// The half of a pair that was drawn with the density `own`, by the power heuristic.
+    fn by_power(&self, own: f64) -> f64 {
+        self.f * own / (self.light * self.light + self.bsdf * self.bsdf)
+    }
+}
+
+/// What arrived at one point.
+#[derive(Default)]
+struct Arrivals {
+    of_light: Vec<Arrival>,
+    of_bsdf: Vec<Arrival>,
+    /// Those in `of_bsdf` of each ray.
+    rays: Vec<core::ops::Range<usize>>,
+}
+
+impl Arrivals {
+    /// Variance of the pair, times two, if lights were sampled in proportion to `f`, whose integral is `mean`.
+    fn ideal_pair(&self, mean: f64) -> f64 {
+        // Either half, by the balance heuristic.
+        let half = |a: &Arrival| a.f / (a.f / mean + a.bsdf);
+        let count = self.rays.len() as f64;
+        // Moments of the first half, by samples of both kinds.
+        let moment = |power: i32| {
+            let all = self.of_light.iter().chain(&self.of_bsdf);
+            all.map(|a| half(a).powi(power) * a.over_both() / mean).sum::<f64>() / count
+        };
+        let mut bsdf = Moments::default();
+        self.rays.iter().for_each(|ray| bsdf.add(self.of_bsdf[ray.clone()].iter().map(half).sum()));
+        2.0 * (moment(2) - moment(1).powi(2) + bsdf.variance())
     }
 }
 
