@@ -10,7 +10,8 @@
 //! Cases named `nee` are what a host does at a lit point: `at`, `sample`, and the density of the sampled direction.
 //! Those with `lobe` are at glossy surfaces of roughness 0.1.
 //!
-//! The program runs itself under Valgrind once for each case, and has what happens inside of [`measured`] counted.
+//! The program runs itself under Valgrind once for each case, on all cores, and has what happens inside of [`measured`]
+//! counted.
 
 mod building;
 mod bulbs;
@@ -23,7 +24,9 @@ mod scenes;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
-type Error = Box<dyn core::error::Error>;
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+
+type Error = Box<dyn core::error::Error + Send + Sync>;
 
 /// Cases by name, and their counts.
 type Counts = Vec<(String, u64)>;
@@ -57,11 +60,9 @@ fn run() -> Result<ExitCode, Error> {
     }
     let word = words.iter().find(|word| !word.starts_with("--"));
     let is_wanted = |case: &&cases::Case| word.is_none_or(|word| case.name.contains(word.as_str()));
-    let counts: Counts = cases::ALL
-        .iter()
-        .filter(is_wanted)
-        .map(|case| Ok((case.name.to_owned(), count(case)?)))
-        .collect::<Result<_, Error>>()?;
+    let wanted: Vec<_> = cases::ALL.iter().filter(is_wanted).collect();
+    let counts: Counts =
+        wanted.par_iter().map(|case| Ok((case.name.to_owned(), count(case)?))).collect::<Result<_, Error>>()?;
     if let Some(word) = word {
         counts.iter().for_each(|(name, count)| println!("{name:32} {count:>12}"));
         let message = format!("no case is called anything with {word}");
@@ -82,7 +83,8 @@ fn count(case: &cases::Case) -> Result<u64, Error> {
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*measured*"])
         .arg(std::env::current_exe()?)
         .args([CASE, case.name]);
-    let table = std::env::temp_dir().join(format!("fanlight-table-{}", std::process::id()));
+    let table = format!("fanlight-table-{}-{}", std::process::id(), case.name.replace('/', "-"));
+    let table = std::env::temp_dir().join(table);
     if let Some(bytes) = building::table(case.name) {
         std::fs::write(&table, bytes)?;
         valgrind.arg(building::TABLE).arg(&table);
