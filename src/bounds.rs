@@ -12,6 +12,11 @@ pub(crate) fn storable(energy: f64) -> f32 {
     if energy > 0.0 { energy.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32 } else { 0.0 }
 }
 
+/// Least share of the hemisphere that a light counts as sending into: a cone of 8 degrees. *Chosen*.
+///
+/// Larger: narrower beams count as dimmer than they are. Smaller: a beam that next to nothing is in counts as bright.
+const NARROWEST_BEAM: f32 = 0.01;
+
 /// Where the lights of a cluster are, which way they face and how much they send.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightBounds {
@@ -60,6 +65,13 @@ impl LightBounds {
     /// Returns all energy that the cluster sends.
     pub(crate) fn energy(&self) -> f32 {
         self.flux + self.portal
+    }
+
+    /// Returns the energy over the part of the hemisphere around each normal that it is sent into, or over two
+    /// hemispheres for what sends everywhere.
+    pub(crate) fn brightness(&self) -> f32 {
+        let (_, cos) = math::sin_cos(self.emission);
+        self.energy() / (1.0 - cos).max(NARROWEST_BEAM)
     }
 
     /// Returns the cost of the cluster in the surface area orientation heuristic: `M_A · M_Ω · energy`.

@@ -188,7 +188,7 @@ impl fmt::Display for ErrorKind {
                 write!(f, "mesh {mesh}: texture {texture} was never added, this builder has {textures}")
             }
             ErrorKind::UnknownMesh { mesh, meshes } => {
-                write!(f, "mesh {mesh} was never added, this sampler has {meshes}")
+                write!(f, "mesh {mesh} was never added or has been removed, this sampler has {meshes}")
             }
             ErrorKind::TriangleCount { mesh, found, expected } => {
                 write!(f, "mesh {mesh}: {found} triangles given, but it was added with {expected}")
@@ -197,7 +197,7 @@ impl fmt::Display for ErrorKind {
                 write!(f, "mesh {mesh}: triangle {triangle} has an area now, but had none when the sampler was built")
             }
             ErrorKind::UnknownLight { light, lights } => {
-                write!(f, "light {light} was never added, this sampler has {lights}")
+                write!(f, "light {light} was never added or has been removed, this sampler has {lights}")
             }
             ErrorKind::RevivedLight { light } => {
                 write!(f, "light {light} emits now, but emitted nothing when the sampler was built")
@@ -229,7 +229,7 @@ impl fmt::Display for ErrorKind {
                 )
             }
             ErrorKind::UnknownInstance { instance, instances } => {
-                write!(f, "instance {instance} was never added, this sampler has {instances}")
+                write!(f, "instance {instance} was never added or has been removed, this sampler has {instances}")
             }
             ErrorKind::EndCount { mesh, found, vertices } => {
                 write!(

@@ -104,7 +104,7 @@ impl Projection<'_> {
         if self.filter == Filter::Nearest {
             return self.texel(column, row);
         }
-        // Of what is linear between centers: an eighth of both neighbors along each axis.
+        // The mean of what is linear between centers: an eighth of both neighbors along each axis.
         let across = |row: usize| {
             let [before, at, after] =
                 [column.saturating_sub(1), column, column + 1].map(|column| self.texel(column, row));

@@ -109,6 +109,6 @@ pub(crate) use for_lobe;
 /// Returns a unit vector, or zero for what has no direction.
 #[inline]
 pub(super) fn unit_or_zero(vector: Vec3) -> Vec3 {
-    // Of doubles, whose squares neither overflow nor vanish.
+    // In doubles, whose squares neither overflow nor vanish.
     vector.as_dvec3().normalize_or_zero().as_vec3()
 }

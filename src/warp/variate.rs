@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn the_rest_is_uniform_after_an_unlikely_choice() {
-        // Of 2^24 inputs only those in [0.3, 0.3 + 2^-12) get through, 4096 of them, over and over.
+        // Only inputs in [0.3, 0.3 + 2^-12) get through: 4096 of 2^24, over and over.
         let (low, width) = (f64::from(0.3_f32), 1.0 / 4096.0);
         let mut counts = [0_u32; 64];
         let mut total = 0;

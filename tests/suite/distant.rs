@@ -199,7 +199,7 @@ fn directions_fall_as_the_density_says() {
         }
         let lights = builder.build().expect("few lights");
         let at = lights.at(&ShadingPoint::new(Vec3::ZERO, receivers(&mut pcg)[round % 3]));
-        // The same in every tier, as a sample takes less than a microsecond.
+        // Every tier draws as many, as a sample takes less than a microsecond.
         let n = 100_000;
         let mut observed = vec![0.0; BANDS * BANDS + 1];
         for _ in 0..n {

@@ -355,7 +355,7 @@ fn the_places_of_the_last_mesh_that_was_removed_are_the_next() {
         numbers.iter().for_each(|&number| edits.remove_mesh(mesh(number)).expect("the mesh is there"));
         edits.apply().expect("nothing is added");
     };
-    // Of one batch in the order of their numbers.
+    // One batch frees its numbers in ascending order, whatever the order of the calls: the last one is used first.
     remove(&mut lights, &[9, 2, 5]);
     remove(&mut lights, &[3]);
     for is_applied in [false, true] {

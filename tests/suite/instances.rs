@@ -608,7 +608,7 @@ fn errors_name_the_instance_and_the_value() {
     let bytes = lights.to_bytes();
     assert_eq!(
         message(lights.refit_instances(&[(InstanceId::from_index(4), place(Mat3::IDENTITY, Vec3::Z))])),
-        "instance 4 was never added, this sampler has 1"
+        "instance 4 was never added or has been removed, this sampler has 1"
     );
     let text =
         message(lights.refit_instances(&[(first, place(Mat3::IDENTITY, Vec3::ONE)), (first, place(flat, Vec3::Z))]));

@@ -85,7 +85,7 @@ fn panel(svg: &mut String, [left, top]: [f64; 2], rows: &[Row], x: [f64; 2], y: 
     }
     let kind = |row: &Row| if row.method == "fanlight" { 2 } else { usize::from(row.is_best) };
     for (wanted, color) in COLORS.into_iter().enumerate() {
-        // Of fanlight's variants only the plain one is drawn.
+        // Only the plain one of fanlight's variants is drawn.
         let drawn = rows.iter().filter(|row| kind(row) == wanted && !row.method.starts_with("fanlight@"));
         for Row { curve, .. } in drawn {
             let points: Vec<[f64; 2]> = curve.iter().copied().filter(|[_, error]| *error > 0.0).collect();

@@ -30,7 +30,7 @@ pub(super) fn decode(source: &[u8], count: usize, stride: usize, mode: &str, fil
         _ => return Err(format!("there is no mode `{}`", mode.escape_debug()).into()),
     };
     match filter {
-        // Of the filtered attributes those of normals and tangents are not used here.
+        // Filtered normals and tangents are not used here.
         "NONE" | "OCTAHEDRAL" => {}
         "EXPONENTIAL" => exponential(&mut bytes),
         "QUATERNION" if stride == 8 => quaternions(&mut bytes),

@@ -248,7 +248,7 @@ fn towards_in_frame(luminaire: &Luminaire, direction: Vec3) -> f32 {
 fn frames_agree() {
     let (aim, right, up) = (Vec3::NEG_Z, Vec3::NEG_Y, Vec3::X);
     let all = steps(-90.0, 90.0, 5.0);
-    // Of type C, the vertical angle is away from the aim, at first towards what is above, and then counter-clockwise.
+    // In type C, the vertical angle is away from the aim, at first towards what is above, and then counter-clockwise.
     let wide = |[v, h]: [f32; 2]| {
         let [(sin_v, cos_v), (sin_h, cos_h)] = [v, h].map(|angle| angle.to_radians().sin_cos());
         cos_v * aim + sin_v * (cos_h * up - sin_h * right)

@@ -170,7 +170,7 @@ impl<'a> PathTracer<'a> {
         if passed == Vec3::ZERO {
             return passed;
         }
-        // The same light could have been found by a step from `x` to the surface, and a look from there to the light.
+        // A path could have found this light by a step from `x` to the surface, and a look from there to the light.
         let geometry = at.normal.dot(direction).abs() / distance2;
         let by_path = x.pdf(direction) * geometry * self.density(&y, photon.direction, photon.from.as_ref(), None);
         value * passed * geometry * reflected * photon.radiance / (photon.pdf + by_path)

@@ -118,7 +118,7 @@ impl<'a> PathTracer<'a> {
         if by_path == 0.0 || !self.world.scene.sees(x.position, photon.at.position) {
             return Vec3::ZERO;
         }
-        // The same light could have been found by a step from `x` to the wall, and a look from there to the sky.
+        // A path could have found this light by a step from `x` to the wall, and a look from there to the sky.
         let cosine_pdf = cosine_pdf(photon.at.normal, photon.direction);
         let density = photon.pdf + by_path * (cosine_pdf + self.world.lighting.environment_pdf(photon.direction));
         let reflected_twice = ALBEDO * ALBEDO * by_path * cosine_pdf;

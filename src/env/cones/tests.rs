@@ -57,7 +57,7 @@ fn compare(sky: &Environment) -> u32 {
                         continue;
                     }
                     lit += 1;
-                    // The same texel of the filter, but for the share of what is around it.
+                    // Both read one texel of the filter; they differ by the share of what is around it.
                     close += u32::from((values[i] - alone).abs() <= 0.03 * view.max());
                 }
             }

@@ -13,7 +13,7 @@ fn assert_agrees(view: &EnvironmentView<'_>, u: [f32; 2]) {
     };
     assert!((sample.direction.length() - 1.0).abs() < 1e-6);
     assert!(sample.pdf > 0.0 && sample.pdf.is_finite() && sample.radiance > 0.0, "{u:?} {sample:?}");
-    // The same texel, so the same bits; also for a host that normalizes what it got.
+    // All read one texel, and so the same bits, also for a host that normalizes the direction.
     for direction in [sample.direction, sample.direction.normalize()] {
         assert_eq!(view.pdf(direction), sample.pdf, "{u:?} {sample:?}");
         assert_eq!(view.radiance(direction), sample.radiance, "{u:?} {sample:?}");

@@ -222,7 +222,7 @@ impl<'a> LightChanges<'a> {
         });
         if let Some(scale) = update.scale {
             let average = |leaf: &u32| lights.records.get(*leaf as usize).map_or(0.0, |light| light.root.average);
-            // Of an added mesh it is known only when its textures are built.
+            // The average of an added mesh is known only when its textures are built.
             let known = if added.is_some() { &[] } else { leaves };
             check_scale(mesh, scale, known.iter().map(average).fold(1.0, f32::max))?;
         }

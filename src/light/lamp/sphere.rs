@@ -171,7 +171,7 @@ impl ShapeViewKind for SphereView {
     }
 
     fn normal(&self, point: DVec3) -> DVec3 {
-        // Of a sphere that is smaller than rounding, any normal that faces the point.
+        // A sphere that is smaller than rounding may have any normal that faces the point.
         (point - self.center).normalize_or(-point.normalize_or_zero())
     }
 

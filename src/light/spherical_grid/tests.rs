@@ -244,7 +244,7 @@ fn near_squares_have_the_right_mean_and_little_noise() {
                     Receiver::Surface(normal) => lambert(&relative, normal.as_dvec3()),
                     _ => solid_angle(&relative),
                 };
-                // Of both triangles, chosen by what each sends.
+                // Both triangles, chosen by what each sends.
                 let (mut mean, mut second) = (0.0, 0.0);
                 let count = 3000;
                 for light in &triangles {

@@ -21,7 +21,8 @@ pub(super) struct Item {
     low_and_energy: Vec4,
     /// Upper corner of the box, and bits: the number of the light, and [`Self::TWO_SIDED`].
     high_and_light: Vec4,
-    normal: Vec3A,
+    /// The normal, and the energy over the share of the hemisphere that it is sent into.
+    normal_and_brightness: Vec4,
 }
 
 const _: () = assert!(size_of::<Item>() == 48);
@@ -35,7 +36,7 @@ impl Item {
         Self {
             low_and_energy: bounds.aabb.min.extend(bounds.energy()),
             high_and_light: bounds.aabb.max.extend(f32::from_bits(bits)),
-            normal: bounds.normals.axis.into(),
+            normal_and_brightness: bounds.normals.axis.extend(bounds.brightness()),
         }
     }
 
@@ -58,12 +59,18 @@ impl Item {
     /// Returns the normal, which that of a two-sided light is turned to the side of `reference`: its sign says nothing.
     #[inline(always)]
     pub(super) fn turned_normal(&self, reference: Vec3A) -> Vec3A {
-        if self.is_two_sided() && self.normal.dot(reference) < 0.0 { -self.normal } else { self.normal }
+        let normal = self.normal();
+        if self.is_two_sided() && normal.dot(reference) < 0.0 { -normal } else { normal }
     }
 
     #[inline(always)]
     pub(super) fn normal(&self) -> Vec3A {
-        self.normal
+        Vec3A::from_vec4(self.normal_and_brightness)
+    }
+
+    /// Returns the energy over the share of the hemisphere that it is sent into.
+    pub(super) fn brightness(&self) -> f32 {
+        self.normal_and_brightness.w
     }
 
     #[inline(always)]

@@ -88,7 +88,7 @@ impl<const N: usize> Node<N> {
         let shape = if is_everywhere || is_focused { LANE_SHAPED } else { 0 };
         self.normals[lane] = normal | side | shape;
         let theta = if is_focused { theta + bounds.emission } else { theta };
-        // Of a two-sided light one side always faces the shading point.
+        // One side of a two-sided light always faces the shading point.
         self.tangents[lane] = if bounds.two_sided || is_everywhere || !(theta < WIDEST_STORED_CONE) {
             WIDE
         } else {

@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 use smallvec::SmallVec;
 
 use super::binary::partition;
-use super::classes::{MOST_CLASSES, divide_into};
+use super::classes::{MOST_CLASSES, divide};
 use super::cluster::Item;
 use crate::tlas::arity::{Arity, MAX_LANES};
 use crate::tlas::node::{Child, Node};
@@ -22,25 +22,23 @@ use crate::tlas::tree::Tlas;
 /// Larger: fewer lanes of the root for each. Smaller: lights of more sets share the last tree.
 const MOST_SETS: usize = 4;
 
-/// Sorts lights into classes, by sets of groups first and by size then. Returns the number of lights in each class.
-/// Sets with less energy than the first ones share the last.
-pub(super) fn divide_groups(items: &mut [Item], groups: &[u32], arity: Arity) -> SmallVec<[usize; MOST_CLASSES]> {
+/// Sorts lights into at most `most` classes, by sets of groups first and by size then. Returns the number of lights in
+/// each class. Sets with less energy than the first ones share the last.
+pub(super) fn divide_groups(items: &mut [Item], groups: &[u32], most: usize) -> SmallVec<[usize; MOST_CLASSES]> {
     let set = |item: &Item| groups[item.light() as usize];
     let mut energies = BTreeMap::new();
     items.iter().for_each(|item| *energies.entry(set(item)).or_insert(0.0) += f64::from(item.energy()));
     let mut sets: Vec<(u32, f64)> = energies.into_iter().collect();
     sets.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    // At least two lanes for a class.
-    let lanes = arity.lanes() / 2;
-    sets.truncate(MOST_SETS.min(lanes));
-    let most = (lanes / sets.len().max(1)).clamp(1, MOST_CLASSES);
+    sets.truncate(MOST_SETS.min(most));
+    let most = (most / sets.len().max(1)).clamp(1, MOST_CLASSES);
     let mut classes = SmallVec::new();
     let mut rest = items;
     for (i, (own, _)) in sets.iter().enumerate() {
         let is_last = i + 1 == sets.len();
         let count = if is_last { rest.len() } else { partition(rest, |item| set(item) == *own) };
         let (own, others) = rest.split_at_mut(count);
-        classes.extend(divide_into(own, most));
+        classes.extend(divide(own, most));
         rest = others;
     }
     classes

@@ -1,6 +1,6 @@
-//! How the tree is made: first lights of different size are set apart ([`classes`]), then a binary tree arranges those
-//! of each class ([`binary`]), then comes the wide tree whose nodes are cuts through it ([`collapse`]), and last what
-//! its nodes say of their children ([`fit`]).
+//! How the tree is made: first bright lights and those of different size are set apart ([`classes`]), then a binary
+//! tree arranges those of each class ([`binary`]), then comes the wide tree whose nodes are cuts through it
+//! ([`collapse`]), and last what its nodes say of their children ([`fit`]).
 
 mod binary;
 mod bins;
@@ -14,8 +14,10 @@ mod groups;
 
 use alloc::vec::Vec;
 
+use smallvec::SmallVec;
+
 use binary::{BinaryNode, join};
-use classes::divide;
+use classes::{MOST_CLASSES, divide, outshining};
 use cluster::Item;
 use collapse::collapse;
 use groups::divide_groups;
@@ -58,7 +60,7 @@ pub(crate) fn build_in_groups(
     let arity = arity.narrowed_to(count);
     let mut items = parallel::collect(count, |i| Item::new(&light(i as u32), i as u32));
     let mut binary: Vec<BinaryNode> = bytemuck::zeroed_vec(2 * count - 1);
-    let classes = if groups.is_empty() { divide(&mut items, arity) } else { divide_groups(&mut items, groups, arity) };
+    let classes = set_apart(&mut items, groups, arity);
     join(&mut items, &mut binary, &classes, progress);
     progress.check()?;
     drop(items);
@@ -71,6 +73,17 @@ pub(crate) fn build_in_groups(
         tlas.note_groups(|leaf| groups[order[leaf as usize] as usize]);
     }
     Ok((tlas, order))
+}
+
+/// Sorts lights into the classes that have trees of their own. Returns the number of lights in each.
+fn set_apart(items: &mut [Item], groups: &[u32], arity: Arity) -> SmallVec<[usize; 2 * MOST_CLASSES]> {
+    let bright = outshining(items, arity);
+    let others = &mut items[bright..];
+    // At least two lanes for a class.
+    let most = (arity.lanes() - bright) / 2;
+    let others =
+        if groups.is_empty() { divide(others, most.min(MOST_CLASSES)) } else { divide_groups(others, groups, most) };
+    core::iter::repeat_n(1, bright).chain(others).collect()
 }
 
 /// Arranges lights in a tree of just this arity, without a look at their sizes or groups: a part of a larger tree.

@@ -178,15 +178,54 @@ fn a_lobe_that_turns_makes_no_steps() {
     }
 }
 
-/// A lobe narrows from all directions until it counts as a cone, and from there to a ray. In between, at 1.25 radians,
-/// the tree of arity 16 puts the lamp among others (docs/LIGHTS.md, "Where noise has steps").
+/// A lobe narrows from all directions until it counts as a cone, and from there to a ray.
 #[test]
 fn a_lobe_that_narrows_makes_no_steps() {
-    for (from, to) in [(PI, 1.3), (1.24, 0.02_f32)] {
-        let steps = ((from / to).ln() / 0.02).ceil() as usize;
-        check_lamp(&format!("narrowed from {from}"), steps, |i| {
-            let width = from * (to / from).powf(i as f32 / steps as f32);
-            Step { table: lobe(width), position: LAMP, axis: vec3(0.1, 0.0, -1.0), scale: 30.0 }
-        });
+    let (from, to) = (PI, 0.02_f32);
+    let steps = ((from / to).ln() / 0.02).ceil() as usize;
+    check_lamp(&format!("narrowed from {from}"), steps, |i| {
+        let width = from * (to / from).powf(i as f32 / steps as f32);
+        Step { table: lobe(width), position: LAMP, axis: vec3(0.1, 0.0, -1.0), scale: 30.0 }
+    });
+}
+
+/// A lamp with a lobe of 17 degrees comes down through the others on the ceiling, by steps of 2 % of its height.
+#[test]
+fn a_lamp_that_moves_makes_no_steps() {
+    check_lamp("lowered", 150, |i| {
+        let position = LAMP.with_z(6.0 * 0.98_f32.powi(i as i32));
+        Step { table: lobe(0.3), position, axis: vec3(0.1, 0.0, -1.0), scale: 60.0 }
+    });
+}
+
+/// Points that come to a lamp with a lobe of 17 degrees by 3 % of their distance.
+#[test]
+fn points_that_approach_a_lamp_make_no_steps() {
+    const STEPS: usize = 150;
+    let step = Step { table: lobe(0.3), position: LAMP, axis: vec3(0.1, 0.0, -1.0), scale: 60.0 };
+    let axis = step.axis.normalize();
+    let surroundings = |i: usize| {
+        let mut pcg = Pcg32::new(19, 185);
+        let distance = 3.0 * 0.97_f32.powi(i as i32);
+        let point = |k: usize| {
+            // In its lobe and around it.
+            let aside = vec3(pcg.within(-0.4, 0.4), pcg.within(-0.4, 0.4), 0.0);
+            let receiver = if k % 3 == 2 { Receiver::Volume } else { Receiver::Surface(Vec3::Z) };
+            ShadingPoint::new(LAMP + distance * (axis + aside), receiver)
+        };
+        Surroundings::new((0..POINTS).map(point).collect())
+    };
+    for number in some(ARITIES.len()) {
+        let lights = surroundings(0).build(&step, number);
+        check(&format!("approached, {number}"), STEPS, MOST_REBUILT, |i| surroundings(i).deviations(&lights, &step));
     }
+}
+
+/// A lamp with a lobe of 17 degrees becomes brighter by 5 % at a time, until it outshines all others.
+#[test]
+fn a_lamp_that_brightens_makes_no_steps() {
+    check_lamp("brightened", 150, |i| {
+        let scale = 0.1 * 1.05_f32.powi(i as i32);
+        Step { table: lobe(0.3), position: LAMP, axis: vec3(0.1, 0.0, -1.0), scale }
+    });
 }

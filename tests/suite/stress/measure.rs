@@ -102,7 +102,7 @@ pub(crate) fn measure(
         (integral, unresolved)
     };
     found.normalization = (integral + found.none - 1.0).abs();
-    // Of a rate without an exception among n, an exception in 12 / n would be too likely to miss.
+    // Where n samples had no exception, a rate of 12 / n would hardly have been missed.
     let unseen = if found.none > 0.0 { 12.0 / estimate.samples as f64 } else { 0.0 };
     found.normalization_resolution = unresolved + (LIMIT * estimate.none[1]).max(unseen);
     if found.none == 1.0 {

@@ -111,7 +111,7 @@ fn points_outside_of_all_regions_are_sampled_as_without_a_table() {
         };
         assert_eq!(changed(&lights, table, &samples, &mut pcg, others), 0, "scene {number}, other orientations");
     }
-    // The same test finds the table where there are regions, and a table that has no outside.
+    // This test notices the table where there are regions, and a table that has no outside.
     assert!(inside > 9 * KINDS, "the table changes only {inside} points");
     assert!(told_apart > 4, "only {told_apart} tables without an outside are told apart");
 }

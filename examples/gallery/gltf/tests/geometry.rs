@@ -16,7 +16,7 @@ fn instances() {
         file.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": attributes });
         let read = file.read();
         assert_eq!(read.area(0), 3.0);
-        // Of the first triangle of each, whose longest side is the square's diagonal.
+        // Middles of the longest side of the first triangle of each, the square's diagonal.
         let middles: Vec<Vec3> = read.corners(0).iter().step_by(2).map(|[a, _, c]| (*a + *c) / 2.0).collect();
         assert_eq!(middles, [vec3(0.0, 2.0, 0.0), vec3(2.0, 2.0, 0.0), vec3(-2.0, 2.0, 0.0)]);
     }

@@ -256,7 +256,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             (Density::by_area, share)
         };
         for [first, second] in values {
-            // Of the mean of the two, with the share of a quarter.
+            // The variance of the mean of the two, with the share of a quarter.
             self.variance += (unit * (value(first) - value(second))).powi(2) / 64.0;
         }
         if is_by_angle {
