@@ -5,8 +5,8 @@
 //! diagonals of their boxes, each class gets a tree of its own, and the root joins these.
 //!
 //! A cluster that holds a bright light and dim ones is mostly the bright one, but is as wide and sends in as many
-//! directions as all of them: where the bright one shines, it is chosen too seldom. So the brightest lights are lanes of
-//! the root, each by itself, wherever they move and however they turn.
+//! directions as all of them: where the bright one shines, it is chosen too seldom. So the brightest lights are lanes
+//! of the root, each by itself, wherever they move and however they turn.
 
 use smallvec::SmallVec;
 
@@ -25,9 +25,15 @@ const CLASS_RATIO: f32 = 8.0;
 /// Larger: fewer lanes of the root for each. Smaller: lights of more sizes share the last class.
 pub(super) const MOST_CLASSES: usize = 4;
 
-/// Least brightness of a light that outshines the others, relative to their mean.
+/// Least brightness of a light that outshines the others, relative to the mean. *Chosen*; what such lights gain is in
+/// docs/LIGHTS.md, "Where noise has no steps".
+///
+/// Larger: brighter lights are left among others. Smaller: lights that are about as bright as others take their lanes.
 const BRIGHT_OVER_MEAN: f64 = 8.0;
-/// Least brightness of a light that outshines the others, relative to the sum of all.
+/// Least brightness of a light that outshines the others, relative to the sum of all. *Chosen*: half of
+/// the share that each of sixteen lanes has on average.
+///
+/// Larger: of many lights, bright ones are left among others. Smaller: lights that matter little take lanes.
 const BRIGHT_SHARE: f64 = 1.0 / 32.0;
 
 /// Moves the lights that outshine the others to the front, the brightest first. Returns how many of these are to be
