@@ -6,7 +6,7 @@ use crate::common::parallel;
 use crate::common::pcg::Pcg32;
 use crate::common::scene::{Content, LEAST_EFFORT, LOBES, MICROFACETS, Scene, point_of_kind, random_point};
 use crate::common::statistics::{binomial_p, chi_square, sidak};
-use crate::common::tier::{few, fewer, some_slow, tier};
+use crate::common::tier::{fewer, some_slow, tier};
 use fanlight::{Arity, Hit, ShadingPoint, Splitting};
 use glam::Vec3;
 
@@ -102,7 +102,7 @@ fn samples_fill_the_cells_of_triangles_as_the_density_says() {
 
 #[test]
 fn samples_for_lobes_fill_the_cells_of_triangles_as_the_density_says() {
-    check_cells(LOBES, few);
+    check_cells(LOBES, fewer);
 }
 
 #[test]
