@@ -8,7 +8,7 @@
 //! `resampled-8` is what a host does whose BSDF the crate does not know: a pair whose light sample is one of eight
 //! blind ones, chosen by what it brings. `power` is a pair by the power heuristic with the exponent 2 (Veach and Guibas
 //! 1995). `pair@ideal` is the pair, by the balance heuristic, of a sample of the BSDF and one in exact proportion to
-//! what arrives: what no light sampling is better than that knows everything.
+//! what arrives. It is no lower bound: a light sample that leaves to the BSDF what that finds may do better in a pair.
 //! Emitters do not cover each other: a ray sees all that it crosses.
 
 use core::f64::consts::{FRAC_1_PI, PI, TAU};
