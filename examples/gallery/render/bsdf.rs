@@ -53,6 +53,11 @@ impl Bsdf {
         self.facets.as_ref()
     }
 
+    /// Whether nothing is scattered.
+    pub(crate) fn is_black(&self) -> bool {
+        [self.reflected, self.transmitted, self.glossy] == [Vec3::ZERO; 3]
+    }
+
     /// Whether light comes through from behind.
     pub(crate) fn transmits(&self) -> bool {
         self.shares[1] > 0.0

@@ -93,7 +93,7 @@ impl<'a> PathTracer<'a> {
     /// The vertex of that number, at a point that a ray of that direction has met.
     fn vertex(&self, point: Point, direction: Vec3, number: u32, arrival: Option<f32>) -> Vertex<'a> {
         let bsdf = self.world.bsdf(&point, direction);
-        let lights = self.techniques.lights_at(&point, &bsdf, number);
+        let lights = if bsdf.is_black() { ChoiceAt::None } else { self.techniques.lights_at(&point, &bsdf, number) };
         let guide = self.techniques.guide_at(&point, &bsdf);
         Vertex { place: Place::Surface(point, bsdf), lights, guide, arrival }
     }

@@ -2,6 +2,7 @@
 
 mod emission;
 mod facade;
+mod fog;
 mod letters;
 mod neon;
 mod nested;
@@ -17,6 +18,7 @@ pub(crate) fn study(scene: &Scene, model: &Model, effort: Effort) -> Result<Comp
     match scene.name {
         "letters" => letters::study(model, effort),
         "facade" => facade::study(model, effort),
+        "fog" => fog::study(model, scene.bounces, effort),
         "nested" => nested::study(model, effort),
         "neon" => neon::study(model, effort),
         "street" => street::study(model, scene.bounces, effort),
