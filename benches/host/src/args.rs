@@ -22,6 +22,7 @@ cargo bench -p fanlight-host --bench host -- [OPTIONS]
   --seconds S     CPU time of each image (3; 0.1 with --quick)
   --reference S   CPU time of each reference that is rendered (64 times that of an image, and never less)
   --by-variance   errors by the variance of the images' own samples, for images with less noise than a reference
+  --visibility    in all scenes fanlight also learns what walls hide, not only where there are walls
   --threads N     threads that compute references (all cores); the measurement runs on one
   --quick         a few scenes that need no data, in less than two minutes
   --validate      compares with the references of another renderer instead
@@ -45,6 +46,8 @@ pub(crate) struct Args {
     pub(crate) reference: f64,
     /// Whether errors are those that the variance of an image's own samples predicts.
     pub(crate) by_variance: bool,
+    /// Whether what walls hide is learned in all scenes.
+    pub(crate) visibility: bool,
     pub(crate) threads: usize,
     pub(crate) quick: bool,
     pub(crate) validate: bool,
@@ -69,6 +72,7 @@ impl Args {
             seconds: 0.0,
             reference: 0.0,
             by_variance: false,
+            visibility: false,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             quick: false,
             validate: false,
@@ -89,6 +93,7 @@ impl Args {
                 Long("seconds") => seconds = Some(parser.value()?.parse()?),
                 Long("reference") => args.reference = parser.value()?.parse()?,
                 Long("by-variance") => args.by_variance = true,
+                Long("visibility") => args.visibility = true,
                 Long("threads") => args.threads = parser.value()?.parse()?,
                 Long("quick") => args.quick = true,
                 Long("validate") => args.validate = true,

@@ -13,7 +13,7 @@ use crate::report::Row;
 use crate::statistics::{geometric_mean, ratio};
 use crate::world::World;
 
-/// Scenes in which fanlight also learns what walls hide; the last one has no walls.
+/// Scenes in which fanlight also learns what walls hide, whether or not it is asked to; the last one has no walls.
 const LEARNED: [&str; 4] = ["two-rooms", "building", "building-windows", "cornell"];
 /// Rays that it learns by, for each second of an image. They take about a twentieth of an image's time, and count as
 /// part of it.
@@ -48,7 +48,8 @@ pub(crate) fn measure(
     reference: &Reference,
     args: &Args,
 ) -> Result<Vec<Row>, Error> {
-    let rays = if LEARNED.contains(&scene) { (LEARNING_RAYS * args.seconds) as u64 } else { 0 };
+    let is_learned = args.visibility || LEARNED.contains(&scene);
+    let rays = if is_learned { (LEARNING_RAYS * args.seconds) as u64 } else { 0 };
     let methods = Method::all(world, bounces, rays)?;
     let costs = cost::measure(world, &methods, bounces);
     let mut outcomes: Vec<Outcome> = methods.iter().map(|_| Outcome::default()).collect();
