@@ -29,12 +29,12 @@ impl LightSamplerView<'_> {
                 let each = queries.iter().zip(samples);
                 each.for_each(|((x, u), sample)| *sample = self.at(x).sample(*u));
             } else {
-                self.sample_few(queries, samples);
+                self.sample_interleaved(queries, samples);
             }
         }
     }
 
-    fn sample_few(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
+    fn sample_interleaved(&self, queries: &[(ShadingPoint, [f32; 3])], samples: &mut [Option<LightSample>]) {
         let mut walks = SmallVec::<[Descent<Viewpoint<'_>, NoLobe>; INTERLEAVED]>::new();
         let mut points = SmallVec::<[[Variate; 2]; INTERLEAVED]>::new();
         for (x, u) in queries {
