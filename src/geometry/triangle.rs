@@ -78,6 +78,15 @@ pub(crate) fn cross_plane(vertices: [DVec3; 3], direction: DVec3) -> Option<([f6
     Some(([-a.dot(p) / determinant, direction.dot(q) / determinant], e2.dot(q) / determinant))
 }
 
+/// Returns the barycentrics `b1`, `b2` of a point in the plane of a triangle, or of the point of the plane nearest to it.
+pub(crate) fn locate(vertices: [DVec3; 3], point: DVec3) -> [f64; 2] {
+    let [a, b, c] = vertices;
+    let (e1, e2) = (b - a, c - a);
+    let normal = e1.cross(e2);
+    let scaled = normal / normal.length_squared();
+    [(point - a).cross(e2).dot(scaled), e1.cross(point - a).dot(scaled)]
+}
+
 /// Returns the barycentrics `[b1, b2]` of the centers of the `n²` congruent triangles that a triangle is divided into.
 pub(crate) fn subdivision_centers(n: u32) -> impl Iterator<Item = [f64; 2]> {
     let center = move |i: u32| f64::from(i) / f64::from(3 * n);

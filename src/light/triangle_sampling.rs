@@ -215,8 +215,16 @@ fn sample_uniformly(
     let direction = grid.draw_uniformly(u);
     let (barycentrics, distance) = geometry::cross_plane(view.exact_vertices, direction)?;
     let point = Lattice::inside(barycentrics);
-    let relative = if view.resolves_directions() { view.position(point) } else { direction * distance };
-    Some(DrawnPoint { point: LocalPoint::on_triangle(point), relative, pdf: grid.uniform_pdf() })
+    let drawn =
+        |point, relative| DrawnPoint { point: LocalPoint::on_triangle(point), relative, pdf: grid.uniform_pdf() };
+    if view.resolves_directions() {
+        return Some(drawn(point, view.position(point)));
+    }
+    let relative = direction * distance;
+    // Of a direction that grazes the triangle, barycentrics are rounded farther than to the lattice.
+    let is_below = |point| view.is_below_horizon(view.position(point));
+    let point = if is_below(point) { Lattice::inside(geometry::locate(view.exact_vertices, relative)) } else { point };
+    (!is_below(point)).then(|| drawn(point, relative))
 }
 
 /// Finds the density of a point that is drawn by its direction. `None` where cells are drawn by area.

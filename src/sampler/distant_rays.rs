@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::emission_sample::EmissionSample;
 use super::finite::to_positive;
-use crate::light::{DistantRecord, LightsView};
+use crate::light::{DistantRecord, FARTHEST_POINT, LightsView};
 use crate::math;
 use crate::warp::Variate;
 
@@ -20,10 +20,13 @@ pub(super) struct DistantRays {
 }
 
 impl DistantRays {
-    /// Returns the rays into a ball; `None` where nothing is sent, or for an invalid ball.
+    /// Returns the rays into a ball; `None` where nothing is sent, or for a ball that is invalid or so large or far away
+    /// that positions around it would overflow.
     pub(super) fn new(lights: &LightsView<'_>, center: Vec3, radius: f32) -> Option<Self> {
         let irradiance = lights.extras().distants().iter().map(|light| f64::from(light.irradiance())).sum();
-        let is_ball = radius > 0.0 && radius.is_finite() && center.is_finite();
+        // NaN fails.
+        let is_near = center.abs().cmple(Vec3::splat(FARTHEST_POINT)).all();
+        let is_ball = radius > 0.0 && radius <= FARTHEST_POINT && is_near;
         (irradiance > 0.0 && is_ball).then_some(Self { center: center.as_dvec3(), radius: radius.into(), irradiance })
     }
 

@@ -90,8 +90,8 @@ impl<'a> Emission<'a> {
     ///
     /// The density is per area perpendicular to the direction and, if the light has an extent, per solid angle. So the
     /// power of a ray is radiance over density, or irradiance over density for a light without an extent. Without
-    /// distant lights, or with a radius that is not positive, nothing changes; another ball takes the place of the one
-    /// before.
+    /// distant lights, or with a radius that is not positive, nothing changes, and neither does it with a coordinate or a
+    /// radius above 1e15; another ball takes the place of the one before.
     pub fn within(mut self, center: Vec3, radius: f32) -> Self {
         let Some(rays) = DistantRays::new(&self.scene.lights, center, radius) else { return self };
         let share = rays.power() / (rays.power() + self.power());

@@ -2,7 +2,9 @@
 
 use crate::checks;
 use crate::common::tier::tier;
-use fanlight::{Environment, Filter, LightSampler, LightSamplerView, Mesh, Receiver, ShadingPoint, Sides};
+use fanlight::{
+    DistantLight, Environment, Filter, LightSampler, LightSamplerView, Mesh, Receiver, ShadingPoint, Sides,
+};
 use glam::Vec3;
 use rand_pcg::{Pcg32, rand_core::Rng};
 
@@ -29,6 +31,29 @@ fn random_bytes() {
 #[test]
 fn random_bytes_of_visibility() {
     inputs(tier().inputs / 2).for_each(|input| checks::visibility(&input));
+}
+
+/// Once a direction that grazed a triangle, from a point on its edge, led to a point with a density of zero.
+#[test]
+fn a_point_on_the_edge_of_a_triangle() {
+    checks::visibility(b"`N\x0e\x02\x0e\x07\0\0\0\0\0\0\x0e\x0e\x0e\x0e\x0e\x0e[\x0e[\x07\x02\x07\xa7");
+}
+
+/// Photons of a distant light once started at infinity, as their ball was that large.
+#[test]
+fn photons_into_a_ball_beyond_all_distances() {
+    let mut builder = LightSampler::builder();
+    builder.add_light(DistantLight::new(Vec3::NEG_Z, 1.0)).expect("a valid light");
+    let lights = builder.build().expect("one light");
+    let mut drawn = 0;
+    for (center, radius) in [(0.0, 1.0), (1e15, 1e15), (1e16, 1.0), (f32::MAX, 1.0), (0.0, f32::MAX), (f32::NAN, 1.0)] {
+        let emission = lights.emission().within(Vec3::splat(center), radius);
+        if let Some(ray) = emission.sample([0.3, 0.9, 0.9, 0.5, 0.5]) {
+            drawn += 1;
+            assert!(ray.position.is_finite() && ray.pdf > 0.0, "{ray:?}");
+        }
+    }
+    assert_eq!(drawn, 2);
 }
 
 /// Sends to both sides of z = 0.
