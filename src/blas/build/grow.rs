@@ -22,6 +22,13 @@ const WORTHWHILE_CELLS: usize = 256;
 /// little.
 const WORTHWHILE_VARIANCE: f64 = 1.5;
 
+/// Relative variance of sampling inside cells above which those that are black in part may take memory beyond all else
+/// ([`GrowthLimits::rescue`]).
+///
+/// *Measured* on the clip map of grid-10000 (docs/ACCURACY.md, "Memory of textures"). Larger: more samples go
+/// astray between narrow openings. Smaller: more memory for edges that cost little.
+const RESCUE_VARIANCE: f64 = 0.1;
+
 /// The weights over a triangle.
 pub(crate) trait WeightSource: Sync {
     /// What may be wrong with them.
@@ -44,6 +51,9 @@ pub(crate) struct GrowthLimits {
     /// How many more there may be below cells that are not fine, if sampling inside of them has at least the relative
     /// variance [`WORTHWHILE_VARIANCE`].
     pub(crate) worthwhile: usize,
+    /// How many more there may be below cells that are black in part, as long as what sampling inside of cells adds to
+    /// the relative variance is above [`RESCUE_VARIANCE`].
+    pub(crate) rescue: usize,
     /// From this level on, cells are fine: there must be a reason to divide them.
     pub(crate) fine: u32,
     /// Cells of this level are not divided.
@@ -61,12 +71,14 @@ pub(crate) struct GrownTree {
     pub(crate) averages: Vec<f32>,
     /// Which cells have a node below, in the same order. The first such cell has the second node, and so on.
     pub(crate) divided: Vec<bool>,
+    /// Nodes of [`GrowthLimits::rescue`] among them.
+    pub(crate) rescued: usize,
 }
 
 impl GrownTree {
     /// One weight for the whole triangle.
     pub(super) fn constant(average: f32) -> Self {
-        Self { average, averages: Vec::new(), divided: Vec::new() }
+        Self { average, averages: Vec::new(), divided: Vec::new(), rescued: 0 }
     }
 
     /// Number of nodes.
@@ -103,6 +115,8 @@ struct MeasuredCell {
     average: f32,
     /// Estimate of what its contrast adds to the variance, for a cell of unit area.
     variance: f64,
+    /// Whether samples in it may find nothing.
+    has_black: bool,
 }
 
 /// What is found below a divided cell.
@@ -117,7 +131,8 @@ enum FoundChild {
 /// Grows the tree of a triangle in which lookups are not all the same. It has no nodes if none is worth it.
 pub(crate) fn grow<S: WeightSource>(source: &S, limits: &GrowthLimits) -> Result<GrownTree, S::Fault> {
     // The whole triangle stands in front, as the only cell of a node before the first.
-    let mut growing = TreeGrowth { source, averages: alloc::vec![0.0], divided: alloc::vec![false], mass: 0.0 };
+    let (averages, divided) = (alloc::vec![0.0], alloc::vec![false]);
+    let mut growing = TreeGrowth { source, averages, divided, mass: 0.0, rescued: 0 };
     let mut open = alloc::vec![OpenCell { cell: LatticeCell::whole(), at: 0, measured: None }];
     let (mut nodes, mut level, mut share) = (0, 0, 1.0);
     while !open.is_empty() {
@@ -125,7 +140,8 @@ pub(crate) fn grow<S: WeightSource>(source: &S, limits: &GrowthLimits) -> Result
         let room = [limits.nodes, limits.nodes + limits.worthwhile]
             .map(|most| if is_deepest { 0 } else { most.saturating_sub(nodes) });
         let spare = (level >= limits.fine).then_some(limits.variance);
-        open = growing.choose(open, room, spare, share)?;
+        let rescue = if is_deepest { 0 } else { limits.rescue - growing.rescued };
+        open = growing.choose(open, room, rescue, spare, share)?;
         nodes += open.len();
         level += 1;
         share /= ARITY as f64;
@@ -134,12 +150,41 @@ pub(crate) fn grow<S: WeightSource>(source: &S, limits: &GrowthLimits) -> Result
     Ok(growing.finish())
 }
 
+/// Orders cells, each with its variance and its number, from the largest variance on.
+fn by_variance(a: &(f64, u32), b: &(f64, u32)) -> core::cmp::Ordering {
+    b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
+}
+
+/// Sorts cells that there is no room for, those with black that vary most in front, and returns how many of the first are
+/// divided all the same, at most `most`, so that the others add no more than [`RESCUE_VARIANCE`].
+fn rescued(
+    beyond: &mut [(f64, u32)],
+    has_black: impl Fn(&(f64, u32)) -> bool,
+    most: usize,
+    share: f64,
+    mass: f64,
+) -> usize {
+    let mut left: f64 = share * beyond.iter().map(|(variance, _)| variance).sum::<f64>();
+    if most == 0 || left <= RESCUE_VARIANCE * mass {
+        return 0;
+    }
+    beyond.sort_unstable_by(|a, b| has_black(b).cmp(&has_black(a)).then(by_variance(a, b)));
+    let is_needed = |cell: &&(f64, u32)| {
+        let is_needed = left > RESCUE_VARIANCE * mass && has_black(cell);
+        left -= share * cell.0;
+        is_needed
+    };
+    beyond.iter().take(most).take_while(is_needed).count()
+}
+
 struct TreeGrowth<'a, S> {
     source: &'a S,
     averages: Vec<f32>,
     divided: Vec<bool>,
     /// The integral over all leaves so far, for a triangle of unit area.
     mass: f64,
+    /// Nodes of [`GrowthLimits::rescue`] so far.
+    rescued: usize,
 }
 
 impl<S: WeightSource> TreeGrowth<'_, S> {
@@ -147,7 +192,8 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
     /// variance (Bhatia and Davis 2000); with two values, and that is what edges have, the bound is exact.
     fn judge(&self, range: TexelRange, average: f32) -> MeasuredCell {
         let [min, max, mean] = [range.min, range.max, average].map(f64::from);
-        MeasuredCell { average, variance: self.source.spread() * (max - mean) * (mean - min) / mean }
+        let variance = self.source.spread() * (max - mean) * (mean - min) / mean;
+        MeasuredCell { average, variance, has_black: min == 0.0 }
     }
 
     fn measure(&self, open: &OpenCell) -> Result<MeasuredCell, S::Fault> {
@@ -173,6 +219,7 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
         &mut self,
         open: Vec<OpenCell>,
         [room, worthwhile_room]: [usize; 2],
+        rescue: usize,
         spare: Option<f64>,
         share: f64,
     ) -> Result<Vec<OpenCell>, S::Fault> {
@@ -182,7 +229,6 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
         let measured = parallel::map(&open, WORTHWHILE_CELLS, |open| self.measure(open))?;
         let mass = self.mass + share * measured.iter().map(|m| f64::from(m.average)).sum::<f64>();
         let mut ranks: Vec<(f64, u32)> = measured.iter().map(|m| m.variance).zip(0..).collect();
-        let by_variance = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
         let count = match spare {
             None => {
                 // The order among those that there is room for does not matter.
@@ -212,6 +258,9 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
                 room.min(ranks.len() - spared)
             }
         };
+        let rescued = rescued(&mut ranks[count..], |&(_, i)| measured[i as usize].has_black, rescue, share, mass);
+        self.rescued += rescued;
+        let count = count + rescued;
         let mut is_kept = alloc::vec![false; open.len()];
         for &(_, i) in &ranks[..count] {
             is_kept[i as usize] = true;
@@ -264,6 +313,11 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
             }
         }
         let average = self.averages[0];
-        GrownTree { average, averages: self.averages.split_off(1), divided: self.divided.split_off(1) }
+        GrownTree {
+            average,
+            averages: self.averages.split_off(1),
+            divided: self.divided.split_off(1),
+            rescued: self.rescued,
+        }
     }
 }

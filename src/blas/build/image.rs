@@ -61,6 +61,10 @@ const TEXELS_OF_COPIES: f64 = (1 << 15) as f64;
 /// Bytes for one triangle, at most. A budget: it bounds what one large image can take.
 const IMAGE_TREE_BYTES: f64 = (1 << 22) as f64;
 
+/// Bytes of [`RESCUE_BYTES`](super::pyramid::RESCUE_BYTES) for one triangle, at most. A budget: half of it, as an image
+/// mostly lies on two triangles.
+const RESCUED_TREE_BYTES: f64 = (3 << 21) as f64;
+
 /// How many shares of [`BYTES_PER_IMAGE`] a triangle may take at most, if triangles of earlier batches have saved
 /// theirs: where an image is detailed in a few places, most triangles take next to nothing.
 ///
@@ -133,7 +137,8 @@ fn units(texture: &Texture<'_>, uv: [Vec2; 3]) -> usize {
 /// others keep their average. There are two bytes for each texel that it can see (four where most samples would go
 /// astray), half a byte (for 2^15 texels at least) where it sees copies of them, more for images of fewer than 2^17
 /// texels, and 4 MB in all (8 MB). If that leaves fewer than four leaves for each copy of the image, the triangle is
-/// not divided.
+/// not divided. Where most of what is left undivided is cells that are black in part, as behind a fine lattice, the
+/// triangles of an image may take 12 MB more.
 ///
 /// What the triangles of a small image share is given out in their order, so that the number of threads changes
 /// nothing.
@@ -255,6 +260,9 @@ impl<'a> ImageGroup<'a> {
             }
             let (root, bytes) = grown[at].tree.store(pool)?;
             let (left, grown_for) = (&mut self.pyramids[slot].memory, &grown[at].memory);
+            let rescue = (grown[at].tree.rescued * size_of::<CellNode>()) as f64;
+            left.rescue -= rescue.min(left.rescue);
+            let bytes = bytes - rescue;
             left.extra -= (bytes - grown_for.own).max(0.0).min(left.extra);
             left.saved = (left.saved - (bytes - grown_for.usual).max(0.0)).max(0.0);
             left.saved_now += (grown_for.usual - bytes).max(0.0);
@@ -296,8 +304,9 @@ impl GrownImage {
         let extra = if texture.filtering() == Filter::Nearest { sharp } else { blurred };
         let deepest = (fine + nearest_level(extra)).min(MAX_HALVINGS / LEVEL_HALVINGS);
         debug_assert!(LATTICE >> (deepest * LEVEL_HALVINGS) >= 16);
-        let worthwhile = memory.worthwhile_nodes();
-        let Ok(tree) = grow(&source, &GrowthLimits { nodes, worthwhile, fine, deepest, variance: IMAGE_VARIANCE });
+        let [worthwhile, rescue] = [memory.worthwhile, memory.rescue].map(nodes_in);
+        let limits = GrowthLimits { nodes, worthwhile, rescue, fine, deepest, variance: IMAGE_VARIANCE };
+        let Ok(tree) = grow(&source, &limits);
         grown(tree)
     }
 
@@ -306,7 +315,7 @@ impl GrownImage {
         let texture = pyramid.texture();
         let memory = TreeBudget::new(&self.uv_triangle, texture, pyramid.memory);
         let [before, now] = [&self.memory, &memory].map(|memory| memory.nodes(&self.uv_triangle, texture));
-        now >= self.tree.nodes().min(before)
+        now >= (self.tree.nodes() - self.tree.rescued).min(before) && nodes_in(memory.rescue) >= self.tree.rescued
     }
 }
 
@@ -381,6 +390,8 @@ struct TreeBudget {
     usual: f64,
     /// How many more are worth it where sampling would be bad: as many again, if it sees no texel twice.
     worthwhile: f64,
+    /// How many more it may take where samples would go astray, with what is left of its image's.
+    rescue: f64,
     /// With what is left of its image's, and what other triangles have saved.
     most: f64,
 }
@@ -397,12 +408,8 @@ impl TreeBudget {
         let shared = BYTES_PER_IMAGE * share;
         let usual = own.max(shared);
         let most = own.max((usual + left.saved).min(MOST_SHARES * shared).min(own + left.extra));
-        Self { own, usual, worthwhile: if covered <= seen { own } else { 0.0 }, most }
-    }
-
-    /// The number of nodes beyond [`Self::nodes`] where they are worth it.
-    fn worthwhile_nodes(&self) -> usize {
-        (self.worthwhile / size_of::<CellNode>() as f64) as usize
+        let [worthwhile, rescue] = if covered <= seen { [own, left.rescue.min(RESCUED_TREE_BYTES)] } else { [0.0; 2] };
+        Self { own, usual, worthwhile, rescue, most }
     }
 
     /// The number of nodes that there is memory for, 0 if dividing would not help.
@@ -410,13 +417,18 @@ impl TreeBudget {
         if uv_triangle.covered() < LEAST_TEXELS {
             return 0;
         }
-        let nodes = ((self.most / size_of::<CellNode>() as f64) as usize).max(1);
+        let nodes = nodes_in(self.most).max(1);
         let [w, h] = texture.size().map(f64::from);
         let copies = 0.5 * uv_triangle.extent().0 / (w * h);
         let leaves = ((ARITY - 1) * nodes) as f64;
         let repeats = !texture.wrapping().contains(&Wrap::Clamp);
         if repeats && leaves < LEAVES_PER_COPY * copies { 0 } else { nodes }
     }
+}
+
+/// The number of nodes that bytes hold.
+fn nodes_in(bytes: f64) -> usize {
+    (bytes / size_of::<CellNode>() as f64) as usize
 }
 
 #[cfg(test)]

@@ -144,7 +144,7 @@ pub(crate) fn build_procedural(
     let most = (FUNCTION_OWN_BYTES + function.extra).min(FUNCTION_TREE_BYTES);
     let nodes = ((most / size_of::<CellNode>() as f64) as usize).max(1);
     let deepest = MAX_HALVINGS / LEVEL_HALVINGS;
-    let limits = GrowthLimits { nodes, worthwhile: 0, fine: 0, deepest, variance: FUNCTION_VARIANCE };
+    let limits = GrowthLimits { nodes, worthwhile: 0, rescue: 0, fine: 0, deepest, variance: FUNCTION_VARIANCE };
     let tree = grow(&source, &limits).map_err(fail)?;
     let (root, bytes) = tree.store(pool)?;
     function.extra -= (bytes - FUNCTION_OWN_BYTES).max(0.0).min(function.extra);

@@ -9,6 +9,11 @@ use crate::parallel::{self, WORTHWHILE};
 /// they need. A budget: images of fewer than 2^17 texels have sharper edges with more.
 pub(super) const BYTES_PER_IMAGE: f64 = (1 << 18) as f64;
 
+/// Bytes for edges between openings so narrow that samples go astray without them. All triangles of an image share it:
+/// the first ones take what they need. A budget: a lattice of 100 x 100 openings on 400² texels takes all of it; images
+/// with fewer edges, and noise, take nothing (docs/ACCURACY.md, "Memory of textures").
+pub(super) const RESCUE_BYTES: f64 = (3 << 22) as f64;
+
 /// What is known of a block of texels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TexelBlock {
@@ -39,6 +44,8 @@ pub(super) struct ImageMemory {
     pub(super) saved: f64,
     /// Bytes that triangles of this batch have left, for the next batch.
     pub(super) saved_now: f64,
+    /// Bytes for edges without which samples go astray.
+    pub(super) rescue: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -50,7 +57,7 @@ struct PyramidLevel {
 impl<'a> TexturePyramid<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
-        let memory = ImageMemory { extra: BYTES_PER_IMAGE, ..ImageMemory::default() };
+        let memory = ImageMemory { extra: BYTES_PER_IMAGE, rescue: RESCUE_BYTES, ..ImageMemory::default() };
         let mut pyramid = Self { texture, levels: Vec::new(), memory };
         let mut size = texture.size();
         while size != [1, 1] {

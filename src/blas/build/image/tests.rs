@@ -241,6 +241,31 @@ fn edges_between_large_texels_are_followed() {
     assert!(dark < 0.02 * lit, "{dark} {lit}");
 }
 
+/// Between openings of two texels few samples are lost, whatever the size of the image, and its memory is bounded.
+#[test]
+fn openings_of_a_fine_lattice_are_found() {
+    for size in [200_usize, 300, 400] {
+        let is_open = |i: usize| (1..3).contains(&(i % 4));
+        let texels: Vec<f32> =
+            (0..size * size).map(|i| f32::from(u8::from(is_open(i % size) && is_open(i / size)))).collect();
+        let texture = Texture::new(size, size, &texels).unwrap().filter(Filter::Nearest).wrap(Wrap::Clamp, Wrap::Clamp);
+        let mut pyramid = TexturePyramid::new(texture);
+        let mut pool = Vec::new();
+        let root = build(&mut pyramid, LOWER, &mut pool).unwrap();
+        let bytes = pool.len() * size_of::<CellNode>();
+        assert!(bytes as f64 <= RESCUED_TREE_BYTES + 4.0 * (size * size) as f64, "{size}: {bytes}");
+        let mut rng = Pcg32::new(28, 4);
+        let (mut lit, mut dark) = (0.0, 0.0);
+        for _ in 0..50_000 {
+            let b = random_barycentrics(&mut rng);
+            let weight = *path(root, &pool, b).last().unwrap();
+            *(if host(&texture, LOWER, b) > 0.0 { &mut lit } else { &mut dark }) += weight;
+        }
+        // A quarter would be lost with two bytes a texel.
+        assert!(dark < 0.16 * (lit + dark), "{size}: {dark} {lit}");
+    }
+}
+
 /// Trees that are grown side by side are those of one after the other, also where the image's memory runs out.
 #[test]
 fn order_decides_who_gets_what_is_left() {
