@@ -61,8 +61,8 @@ const TEXELS_OF_COPIES: f64 = (1 << 15) as f64;
 /// Bytes for one triangle, at most. A budget: it bounds what one large image can take.
 const IMAGE_TREE_BYTES: f64 = (1 << 22) as f64;
 
-/// Bytes of [`RESCUE_BYTES`](super::pyramid::RESCUE_BYTES) for one triangle, at most. A budget: half of it, as an image
-/// mostly lies on two triangles.
+/// Bytes for edges without which samples go astray, for one triangle at most. A budget: half of what an image may take,
+/// as an image mostly lies on two triangles.
 const RESCUED_TREE_BYTES: f64 = (3 << 21) as f64;
 
 /// How many shares of [`BYTES_PER_IMAGE`] a triangle may take at most, if triangles of earlier batches have saved
@@ -138,7 +138,7 @@ fn units(texture: &Texture<'_>, uv: [Vec2; 3]) -> usize {
 /// astray), half a byte (for 2^15 texels at least) where it sees copies of them, more for images of fewer than 2^17
 /// texels, and 4 MB in all (8 MB). If that leaves fewer than four leaves for each copy of the image, the triangle is
 /// not divided. Where most of what is left undivided is cells that are black in part, as behind a fine lattice, the
-/// triangles of an image may take 12 MB more.
+/// triangles of an image may take 64 bytes for each of its texels more, and 12 MB at most.
 ///
 /// What the triangles of a small image share is given out in their order, so that the number of threads changes
 /// nothing.

@@ -39,11 +39,11 @@ const FULL: Tier = Tier {
     agreement_divisor: 1,
     agreement_least: 0,
     points: 20,
-    cases: 400,
+    cases: 200,
     histogram: 100_000,
     stride: 1,
     wide_stride: 5,
-    inputs: 20_000,
+    inputs: 8000,
     triangles: 1_000_000,
     tiles: &[16, 64, 256],
 };
