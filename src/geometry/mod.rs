@@ -14,4 +14,4 @@ pub(crate) use horizon::{HORIZON_ROUNDING, horizon, is_below};
 pub(crate) use motion::{area_vectors, between, cofactors, determinants};
 pub(crate) use placement::{ForwardMap, Placement, norm};
 pub(crate) use polygon::Polygon;
-pub(crate) use triangle::{Triangle, cross_plane, intersect, locate, normal_and_area, subdivision_centers};
+pub(crate) use triangle::{Triangle, barycentrics_of, cross_plane, intersect, normal_and_area, subdivision_centers};

@@ -79,7 +79,7 @@ pub(crate) fn cross_plane(vertices: [DVec3; 3], direction: DVec3) -> Option<([f6
 }
 
 /// Returns the barycentrics `b1`, `b2` of a point in the plane of a triangle, or of the point of the plane nearest to it.
-pub(crate) fn locate(vertices: [DVec3; 3], point: DVec3) -> [f64; 2] {
+pub(crate) fn barycentrics_of(vertices: [DVec3; 3], point: DVec3) -> [f64; 2] {
     let [a, b, c] = vertices;
     let (e1, e2) = (b - a, c - a);
     let normal = e1.cross(e2);

@@ -223,7 +223,10 @@ fn sample_uniformly(
     let relative = direction * distance;
     // Of a direction that grazes the triangle, barycentrics are rounded farther than to the lattice.
     let is_below = |point| view.is_below_horizon(view.position(point));
-    let point = if is_below(point) { Lattice::inside(geometry::locate(view.exact_vertices, relative)) } else { point };
+    if !is_below(point) {
+        return Some(drawn(point, relative));
+    }
+    let point = Lattice::inside(geometry::barycentrics_of(view.exact_vertices, relative));
     (!is_below(point)).then(|| drawn(point, relative))
 }
 

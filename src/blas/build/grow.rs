@@ -22,12 +22,18 @@ const WORTHWHILE_CELLS: usize = 256;
 /// little.
 const WORTHWHILE_VARIANCE: f64 = 1.5;
 
-/// Relative variance of sampling inside cells above which those that are black in part may take memory beyond all else
+/// Relative variance that cells that are black in part may leave before they take memory beyond all else
 /// ([`GrowthLimits::rescue`]).
 ///
 /// *Measured* on the clip map of grid-10000 (docs/ACCURACY.md, "Memory of textures"). Larger: more samples go
 /// astray between narrow openings. Smaller: more memory for edges that cost little.
 const RESCUE_VARIANCE: f64 = 0.1;
+
+/// Ratio of a cell's average to its largest weight up to which it does not count as black in part. *Chosen*, far above the
+/// rounding of averages: cells that end where texels do may touch the next texel.
+///
+/// Larger: thin slices of openings are left inside of cells. Smaller: memory for what rounding shows.
+const LEAST_AVERAGE: f64 = 1.0 / 256.0;
 
 /// The weights over a triangle.
 pub(crate) trait WeightSource: Sync {
@@ -51,8 +57,8 @@ pub(crate) struct GrowthLimits {
     /// How many more there may be below cells that are not fine, if sampling inside of them has at least the relative
     /// variance [`WORTHWHILE_VARIANCE`].
     pub(crate) worthwhile: usize,
-    /// How many more there may be below cells that are black in part, as long as what sampling inside of cells adds to
-    /// the relative variance is above [`RESCUE_VARIANCE`].
+    /// How many more there may be below cells that are black in part, as long as what sampling inside of them adds to the
+    /// relative variance is above [`RESCUE_VARIANCE`].
     pub(crate) rescue: usize,
     /// From this level on, cells are fine: there must be a reason to divide them.
     pub(crate) fine: u32,
@@ -115,7 +121,7 @@ struct MeasuredCell {
     average: f32,
     /// Estimate of what its contrast adds to the variance, for a cell of unit area.
     variance: f64,
-    /// Whether samples in it may find nothing.
+    /// Whether it is black in part, and not all but for what rounding shows.
     has_black: bool,
 }
 
@@ -150,13 +156,18 @@ pub(crate) fn grow<S: WeightSource>(source: &S, limits: &GrowthLimits) -> Result
     Ok(growing.finish())
 }
 
+/// The number of nodes that bytes hold.
+pub(super) fn nodes_in(bytes: f64) -> usize {
+    (bytes / size_of::<CellNode>() as f64) as usize
+}
+
 /// Orders cells, each with its variance and its number, from the largest variance on.
 fn by_variance(a: &(f64, u32), b: &(f64, u32)) -> core::cmp::Ordering {
     b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
 }
 
 /// Sorts cells that there is no room for, those with black that vary most in front, and returns how many of the first are
-/// divided all the same, at most `most`, so that the others add no more than [`RESCUE_VARIANCE`].
+/// divided all the same, at most `most`, so that the others with black add no more than [`RESCUE_VARIANCE`].
 fn rescued(
     beyond: &mut [(f64, u32)],
     has_black: impl Fn(&(f64, u32)) -> bool,
@@ -164,7 +175,7 @@ fn rescued(
     share: f64,
     mass: f64,
 ) -> usize {
-    let mut left: f64 = share * beyond.iter().map(|(variance, _)| variance).sum::<f64>();
+    let mut left = share * beyond.iter().filter(|cell| has_black(cell)).map(|(variance, _)| variance).sum::<f64>();
     if most == 0 || left <= RESCUE_VARIANCE * mass {
         return 0;
     }
@@ -193,7 +204,7 @@ impl<S: WeightSource> TreeGrowth<'_, S> {
     fn judge(&self, range: TexelRange, average: f32) -> MeasuredCell {
         let [min, max, mean] = [range.min, range.max, average].map(f64::from);
         let variance = self.source.spread() * (max - mean) * (mean - min) / mean;
-        MeasuredCell { average, variance, has_black: min == 0.0 }
+        MeasuredCell { average, variance, has_black: min == 0.0 && mean > LEAST_AVERAGE * max }
     }
 
     fn measure(&self, open: &OpenCell) -> Result<MeasuredCell, S::Fault> {

@@ -9,8 +9,8 @@ use glam::Vec2;
 use crate::blas::barycentric::{ARITY, LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
 use crate::blas::build::coverage::average;
 use crate::blas::build::footprint::UvTriangle;
-use crate::blas::build::grow::{GrownTree, GrowthLimits, WeightSource, grow};
-use crate::blas::build::pyramid::{BYTES_PER_IMAGE, ImageMemory, TexturePyramid};
+use crate::blas::build::grow::{GrownTree, GrowthLimits, WeightSource, grow, nodes_in};
+use crate::blas::build::pyramid::{BYTES_PER_IMAGE, ImageMemory, TexturePyramid, rescue_bytes};
 use crate::blas::build::texture::Texture;
 use crate::blas::build::touched::{self, TexelRange};
 use crate::blas::node::{CellNode, Root, storable};
@@ -60,10 +60,6 @@ const TEXELS_OF_COPIES: f64 = (1 << 15) as f64;
 
 /// Bytes for one triangle, at most. A budget: it bounds what one large image can take.
 const IMAGE_TREE_BYTES: f64 = (1 << 22) as f64;
-
-/// Bytes for edges without which samples go astray, for one triangle at most. A budget: half of what an image may take,
-/// as an image mostly lies on two triangles.
-const RESCUED_TREE_BYTES: f64 = (3 << 21) as f64;
 
 /// How many shares of [`BYTES_PER_IMAGE`] a triangle may take at most, if triangles of earlier batches have saved
 /// theirs: where an image is detailed in a few places, most triangles take next to nothing.
@@ -137,7 +133,7 @@ fn units(texture: &Texture<'_>, uv: [Vec2; 3]) -> usize {
 /// others keep their average. There are two bytes for each texel that it can see (four where most samples would go
 /// astray), half a byte (for 2^15 texels at least) where it sees copies of them, more for images of fewer than 2^17
 /// texels, and 4 MB in all (8 MB). If that leaves fewer than four leaves for each copy of the image, the triangle is
-/// not divided. Where most of what is left undivided is cells that are black in part, as behind a fine lattice, the
+/// not divided. Where most of what is left undivided is cells that are black in part, as behind a fine grid of openings, the
 /// triangles of an image may take 64 bytes for each of its texels more, and 12 MB at most.
 ///
 /// What the triangles of a small image share is given out in their order, so that the number of threads changes
@@ -390,7 +386,7 @@ struct TreeBudget {
     usual: f64,
     /// How many more are worth it where sampling would be bad: as many again, if it sees no texel twice.
     worthwhile: f64,
-    /// How many more it may take where samples would go astray, with what is left of its image's.
+    /// How many more it may take where samples would go astray: its share of its image's, or what is left of that.
     rescue: f64,
     /// With what is left of its image's, and what other triangles have saved.
     most: f64,
@@ -408,7 +404,8 @@ impl TreeBudget {
         let shared = BYTES_PER_IMAGE * share;
         let usual = own.max(shared);
         let most = own.max((usual + left.saved).min(MOST_SHARES * shared).min(own + left.extra));
-        let [worthwhile, rescue] = if covered <= seen { [own, left.rescue.min(RESCUED_TREE_BYTES)] } else { [0.0; 2] };
+        let rescue = left.rescue.min(share * rescue_bytes(texture));
+        let [worthwhile, rescue] = if covered <= seen { [own, rescue] } else { [0.0; 2] };
         Self { own, usual, worthwhile, rescue, most }
     }
 
@@ -424,11 +421,6 @@ impl TreeBudget {
         let repeats = !texture.wrapping().contains(&Wrap::Clamp);
         if repeats && leaves < LEAVES_PER_COPY * copies { 0 } else { nodes }
     }
-}
-
-/// The number of nodes that bytes hold.
-fn nodes_in(bytes: f64) -> usize {
-    (bytes / size_of::<CellNode>() as f64) as usize
 }
 
 #[cfg(test)]

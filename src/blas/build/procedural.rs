@@ -6,7 +6,7 @@ use core::fmt;
 use glam::{DVec2, Vec2};
 
 use crate::blas::barycentric::{LATTICE, LEVEL_HALVINGS, LatticeCell, MAX_HALVINGS};
-use crate::blas::build::grow::{GrowthLimits, WeightSource, grow};
+use crate::blas::build::grow::{GrowthLimits, WeightSource, grow, nodes_in};
 use crate::blas::build::touched::TexelRange;
 use crate::blas::node::{CellNode, Root, storable};
 use crate::error::{Error, ErrorKind};
@@ -142,7 +142,7 @@ pub(crate) fn build_procedural(
         return Ok(Root::constant(storable(f64::from(range.max))));
     }
     let most = (FUNCTION_OWN_BYTES + function.extra).min(FUNCTION_TREE_BYTES);
-    let nodes = ((most / size_of::<CellNode>() as f64) as usize).max(1);
+    let nodes = nodes_in(most).max(1);
     let deepest = MAX_HALVINGS / LEVEL_HALVINGS;
     let limits = GrowthLimits { nodes, worthwhile: 0, rescue: 0, fine: 0, deepest, variance: FUNCTION_VARIANCE };
     let tree = grow(&source, &limits).map_err(fail)?;

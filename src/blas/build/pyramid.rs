@@ -10,12 +10,17 @@ use crate::parallel::{self, WORTHWHILE};
 pub(super) const BYTES_PER_IMAGE: f64 = (1 << 18) as f64;
 
 /// Bytes for each texel of an image, for edges between openings so narrow that samples go astray without them. All
-/// triangles of the image share them: the first ones take what they need. A budget: a lattice of 100 x 100 openings on
+/// triangles of the image share them, each by the texels that it covers. A budget: a grid of 100 x 100 openings on
 /// 400² texels takes all of it; images with fewer edges, and noise, take nothing (docs/ACCURACY.md, "Memory of textures").
 const RESCUE_BYTES_PER_TEXEL: f64 = 64.0;
 
 /// Most bytes for such edges. A budget: it bounds what one large image can take.
 const RESCUE_BYTES: f64 = (3 << 22) as f64;
+
+/// Returns the bytes that all triangles of an image may take for such edges.
+pub(super) fn rescue_bytes(texture: &Texture<'_>) -> f64 {
+    (RESCUE_BYTES_PER_TEXEL * texture.texels() as f64).min(RESCUE_BYTES)
+}
 
 /// What is known of a block of texels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,8 +65,7 @@ struct PyramidLevel {
 impl<'a> TexturePyramid<'a> {
     /// Builds the pyramid: 12 bytes for every third texel, about.
     pub(crate) fn new(texture: Texture<'a>) -> Self {
-        let rescue = (RESCUE_BYTES_PER_TEXEL * texture.texels() as f64).min(RESCUE_BYTES);
-        let memory = ImageMemory { extra: BYTES_PER_IMAGE, rescue, ..ImageMemory::default() };
+        let memory = ImageMemory { extra: BYTES_PER_IMAGE, rescue: rescue_bytes(&texture), ..ImageMemory::default() };
         let mut pyramid = Self { texture, levels: Vec::new(), memory };
         let mut size = texture.size();
         while size != [1, 1] {
